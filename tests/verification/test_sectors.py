@@ -22,20 +22,30 @@ def end(sector: str, nodes: str, safety: float = 0.6) -> End:
     return run(simulation.build(case, Path(), SerialComm()))
 
 
+def ends(sector: str, runs: int) -> list[End]:
+    """Returns the results of several runs, each with a time step that is 2 % shorter than that of the run before."""
+    return [end(sector, "particles", 0.6 - 0.01 * k) for k in range(runs)]
+
+
 @pytest.mark.parametrize("sector", ["quarter", "half"])
 def test_a_sector_is_the_whole_while_a_rod_is_used_up(sector: str) -> None:
-    """Momentum, energy, and the mass near the axis agree in the mean of three runs. In an earlier version debris
-    stopped on the planes, which left 1.5 % more energy in the quarter, and nine times as much mass near the axis as in
-    the whole.
-
-    With a time step that is 2 % shorter, single runs change their momentum by 2 %, and the mass near the axis, the mass
-    of a few nodes, by a factor of three.
+    """The momentum and the energy agree in the mean of three runs; the momentum of single runs differs by 2 %. In an
+    earlier version debris stopped on the planes, which left 1.5 % more energy in the quarter.
     """
-    part, whole = ([end(each, "particles", 0.6 - 0.01 * k) for k in range(3)] for each in (sector, "full"))
+    part, whole = ends(sector, 3), ends("full", 3)
     assert min(each.near[1] for each in whole) > 1e-3
-    assert sum(each.near[0] for each in part) < 3.0 * sum(each.near[0] for each in whole)
     assert sum(each.rod for each in part) == pytest.approx(sum(each.rod for each in whole), rel=0.02)
     assert sum(each.kinetic for each in part) == pytest.approx(sum(each.kinetic for each in whole), rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sector", ["quarter", "half"])
+def test_a_sector_has_no_more_debris_near_the_axis_than_the_whole(sector: str) -> None:
+    """The mass near the axis is the mass of a few nodes, and the masses of single runs differ by a factor of ten;
+    therefore the test compares the means of eight runs. In an earlier version debris stopped on the planes, which left
+    nine times as much mass near the axis of the quarter as in the whole.
+    """
+    assert sum(each.near[0] for each in ends(sector, 8)) < 3.0 * sum(each.near[0] for each in ends("full", 8))
 
 
 @pytest.mark.parametrize("sector", ["quarter", "half"])
