@@ -8,8 +8,8 @@ s1 + 3 s3 > 0. In the plane wave of an impact there is no lateral strain, so tha
     s1 = 8 T (1 + k) / (1 - k)^2
 
 The stress s1 is 20 T for nu = 0.22. Alumina with T = 300 MPa and nu = 0.22 has s1 = 6.0 GPa; its measured Hugoniot
-elastic limit is 6.6 GPa (alumina_995_jh2 in materials.toml). In a bar under uniaxial stress the limit of Griffith's
-criterion is 8 T.
+elastic limit is 6.6 GPa (alumina_995_jh2 in materials.toml). In a bar under uniaxial
+compression, Griffith's criterion is reached at 8 times the tensile strength T.
 """
 
 import itertools

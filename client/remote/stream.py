@@ -32,7 +32,8 @@ _CAPACITY = 4096
 """Largest number of messages that wait to be read. Chosen value: a run sends about ten messages per second, so that
 they last for minutes."""
 _BLOBS = 4
-"""Number of snapshots that are kept until they are read. Chosen value: a reader is late by seconds at most."""
+"""Number of snapshots that are kept until they are read. With the chosen number, a snapshot that is read is at most
+some seconds old."""
 _OPEN_SECONDS = 5.0
 """Time limit for the answer of the Zenoh router, s; afterwards SSE is used. Chosen value."""
 _CLOSE_SECONDS = 2.0

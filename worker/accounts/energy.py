@@ -133,8 +133,8 @@ class Ledger:
     def require(self, run: Run, safety: float, when: str) -> None:
         """Raise EnergyError if a limit of ``run`` is exceeded.
 
-        The residual of the last call is compared with run.residual_limit. The energy that a term has created up to any
-        call is compared with run.made_limit. ``safety``: numerics.dt_safety.
+        The residual of the last call is compared with run.residual_limit. The energy that a term has created so far is
+        compared with run.made_limit in each call. ``safety``: numerics.dt_safety.
         """
         limit = run.residual_limit
         for what, share in (

@@ -22,7 +22,9 @@ class BlockPass:
         """Tables of arguments, keyed by part."""
 
     def address(self, nodes: Nodes, block: Block, scratches: Scratches, means: Values, numbers: Values) -> int:
-        """Returns the address of the table of arguments for a block; ``means``: the fields of Means, or no fields."""
+        """Returns the address of the table of arguments for a block. ``means``: the fields of Means (averages over
+        nodes); empty if the pass uses no averages.
+        """
         return self._table(block).set(*self._records(nodes, block), scratches, means, *numbers)
 
     def bind(

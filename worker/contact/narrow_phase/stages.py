@@ -89,9 +89,9 @@ def ahead(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def spread(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Sets the time after the step for which closing pairs are detected. If two slots may approach by FAST_SIZE in the
-    longest next step, as their velocities differ, it is the length of this step, else 0. Slower pairs cannot limit a
-    step, so ranks that have only slow nodes need no data of other ranks.
+    """Sets the length of time, after the end of the step, in which closing pairs are detected. If two slots may
+    approach by FAST_SIZE in the longest next step, as their velocities differ, it is the length of this step, else 0.
+    Slower pairs cannot limit a step, so ranks that have only slow nodes need no data of other ranks.
     """
     (counts, reals, _), boxes = numbers_of(table), places_of(table)[4]
     fastest = closing_speed.spread(boxes, tasks_of(counts[SLOTS_N], SLOTS_OF_A_TASK))

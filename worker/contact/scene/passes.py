@@ -84,7 +84,7 @@ def _enliven(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _flag(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: flags the faces or edges that have a flagged slot among the first ``many`` of their ``corners``."""
+    """Task: flags each face or edge for which at least one of the first ``many`` corners is a flagged slot."""
     out, corners, many, slots = _read_flag(table)
     for f in range(first, stop):
         for k in range(many):
