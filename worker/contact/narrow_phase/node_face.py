@@ -170,8 +170,8 @@ def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
 # 4. If only one of the faces at node s faces the face, s passes the face from outside: gap0 >= -NEAR of the face.
 # 5. The foot of s at tau is on the face, and s is no deeper than ``reach`` of the face and half the altitude of its
 #    tet.
-# 6. No other face has an equal contact with the node and contains its foot better: a node over an edge or a corner of a
-#    flat patch of faces has one contact with the patch, and not one contact with each face.
+# 6. No better face has an equal contact with the node (single_contact.py): a node over an edge or a corner of a flat
+#    patch of faces has one contact with the patch, and not one contact with each face.
 # 7. The node is not beside a convex edge, in front of another face there (facing.in_front).
 # 8. If s is inside by more than TOUCHING, s is not nearer to the front of another face (facing.outside).
 # A node behind several faces of a part keeps its contact with the nearest face (single_contact.nearest).

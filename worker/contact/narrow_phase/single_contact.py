@@ -15,6 +15,9 @@ from .tables import CONTACT_ROWS, FACES, PAIRS, SLOTS, STEP, needed
 _FLAT = 1.0 - 1e-4
 """Smallest cosine of the angle between the normals of two faces of a flat patch; the angle is 0.8 degrees. Chosen
 value: flat faces approximate the normals of a curved surface with a larger error."""
+_ROUNDING = 1e-6
+"""Difference of area coordinates below which two feet have the same margin to the rims of their faces. Chosen value:
+far above rounding errors, so that mirror images choose the images of the same faces, and far below geometry.MARGIN."""
 _NO_CONTACT = -1.0
 """Depth of a row without contact."""
 _I, _F, _N1, _F1 = types.int64, types.float64, types.int32[::1], types.float64[::1]
@@ -45,22 +48,24 @@ def _covers(nodes, weights, r, t):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[:, ::1], int64)", cache=True, forceinline=True)
 def _margin(weights, row):  # type: ignore[no-untyped-def]
-    """Returns the smallest area coordinate of the foot of contact ``row``; it is negative outside of the face."""
-    return min(-weights[row, 1], -weights[row, 2], -weights[row, 3])
+    """Returns the smallest area coordinate of the foot of contact ``row``, in units of _ROUNDING, as a whole number. It
+    is negative outside of the face.
+    """
+    return np.rint(min(-weights[row, 1], -weights[row, 2], -weights[row, 3]) / _ROUNDING)
 
 
 @njit(types.boolean(CONTACT_ROWS, PAIRS, FACES, _N1, _N1, _N1, _I), cache=True)
 def _repeated(out, pairs, faces, found, earlier, last, row):  # type: ignore[no-untyped-def]
-    """Returns whether the node of ``row`` has an equal contact with a face that contains the foot better. Equal
-    contacts have weights that differ by at most RIM, and normals within _FLAT. Of two faces that contain the foot
-    equally well, the face of lower id is the better one.
+    """Returns whether the node of ``row`` has an equal contact with a better face: a face that contains the foot with a
+    larger margin or, if the margins are equal, a face of lower id. Equal contacts have weights that differ by at most
+    RIM, and normals within _FLAT.
     """
     nodes, weights, m = out.nodes, out.weights, out.normals
-    name, q, inside = faces.id[pairs.rows[out.pair[row], 1]], last[nodes[row, 0]], _margin(weights, row)
+    name, q, margin = faces.id[pairs.rows[out.pair[row], 1]], last[nodes[row, 0]], _margin(weights, row)
     while q >= 0:
         t, q = found[q], earlier[q]
-        better = _margin(weights, t)
-        if better < inside or (better == inside and faces.id[pairs.rows[out.pair[t], 1]] >= name):
+        other = _margin(weights, t)
+        if other < margin or (other == margin and faces.id[pairs.rows[out.pair[t], 1]] >= name):
             continue
         if m[t, 0] * m[row, 0] + m[t, 1] * m[row, 1] + m[t, 2] * m[row, 2] < _FLAT:
             continue
