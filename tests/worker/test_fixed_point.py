@@ -22,7 +22,7 @@ from conoid.worker.parallel.fixed_point import (
     scale_for,
     totals_and_words,
 )
-from conoid.worker.parallel.grouped import Grouped, GroupedSums
+from conoid.worker.parallel.grouped import Grouped
 from conoid.worker.parallel.team import team
 from conoid.worker.simulation import Simulation
 
@@ -44,7 +44,7 @@ def values(n: int, seed: int) -> Floats:
 
 def grouped(columns: Floats, group: "np.ndarray", groups: int) -> Grouped:
     """Returns ``columns`` (n, k) whose row i belongs to ``group`` i, summed by two threads."""
-    return GroupedSums(team(2)).of(np.ascontiguousarray(columns.T), group, groups)
+    return Grouped(team(2), groups).of(np.ascontiguousarray(columns.T), group)
 
 
 def test_sums_are_within_the_stated_error() -> None:

@@ -22,7 +22,7 @@ from ..model.rows import WORKS
 from ..model.state import Flags, Floats, Indices, Model, Nodes
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import Columns, Table, Tally, exact_sums, totals_and_words
-from ..parallel.grouped import GroupedSums
+from ..parallel.grouped import Grouped
 from ..parallel.passes import Pass
 from ..parallel.team import Team
 from ..rigid.stage import Rigid
@@ -79,7 +79,7 @@ class Sums:
     ) -> None:  # fmt: skip
         """``undeformed``: rigid parts and walls; ``team``: threads that pass over the nodes."""
         self._pass, self._columns = Pass(team, of_nodes, *OF_NODES), np.empty(0)
-        self._by_part, self._work = GroupedSums(team), ElementWork(team)
+        self._by_part, self._work = Grouped(team, len(model.parts)), ElementWork(model, team)
         self._model, self._boundaries, self._contact, self._bonds = model, boundaries, contact, bonds
         self._erosion, self._undeformed, self._comm, self._clock = erosion, undeformed, comm, clock
         self._cohesion = fracture.cohesion if fracture is not None else None
@@ -124,8 +124,8 @@ class Sums:
         """
         nodes, parts = self._model.nodes, len(self._model.parts)
         tables: dict[str, list[Columns]] = {
-            "nodes": [self._by_part.of(*_with_shares(self._of_nodes(before), nodes), parts)],
-            "tets": [self._work.of(self._model.blocks, parts)],
+            "nodes": [self._by_part.of(*_with_shares(self._of_nodes(before), nodes))],
+            "tets": [self._work],
             "boundaries": [
                 Table(np.where(nodes.owned[each.nodes], each.friction_loss, 0.0)[:, None], parts)
                 for each in self._boundaries if each.friction_loss is not None

@@ -5,7 +5,7 @@ import numpy as np
 from ..kernels.jit import njit, types
 from ..model.growing import Scratch
 from ..model.rows import WORKS
-from ..model.state import CHUNK, Block, Floats, Ints
+from ..model.state import CHUNK, Floats, Ints, Model
 from ..parallel.arguments import reader
 from ..parallel.fixed_point import limbs, magnitude, most
 from ..parallel.passes import Pass
@@ -21,19 +21,14 @@ _CHUNKS = 16
 class ElementWork:
     """Sums of the columns WORKS over all tets, by part, J, computed from the state (fixed_point.Columns)."""
 
-    def __init__(self, team: Team) -> None:
+    def __init__(self, model: Model, team: Team) -> None:
         self._largest = Pass(team, _largest, *_LARGEST, size=_CHUNKS)
         self._limbs = Pass(team, _limbs, *_LIMBS, size=_CHUNKS)
-        self._scratch, self._blocks, self._parts = Scratch(), list[Block](), 0
-
-    def of(self, blocks: list[Block], parts: int) -> "ElementWork":
-        """Returns the sums of these blocks; valid until the next call."""
-        self._blocks, self._parts = blocks, parts
-        return self
+        self._model, self._scratch = model, Scratch()
 
     def largest(self) -> Floats:
         found = np.zeros(len(WORKS))
-        for block in self._blocks:
+        for block in self._model.blocks:
             chunks = -(-block.n // CHUNK)
             some = self._scratch.of("largest", self._largest.many(chunks), np.float64, len(WORKS))
             self._largest.run(chunks, some, block.state, block.n)
@@ -41,8 +36,8 @@ class ElementWork:
         return found
 
     def limbs(self, scale: Floats) -> Ints:
-        words = np.zeros((self._parts, 2, len(WORKS)), np.int64)
-        for block in self._blocks:
+        words = np.zeros((len(self._model.parts), 2, len(WORKS)), np.int64)
+        for block in self._model.blocks:
             chunks = -(-block.n // CHUNK)
             some = self._scratch.of("limbs", self._limbs.many(chunks), np.int64, 2, len(WORKS))
             self._limbs.run(chunks, some, block.state, block.n, scale)

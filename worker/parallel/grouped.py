@@ -44,43 +44,31 @@ def _limbs(table, first, stop, thread):  # type: ignore[no-untyped-def]
         begin = end
 
 
-class GroupedSums:
-    """Passes over columns (k, n) whose row i belongs to ``group`` i, (n,). Sums are fast if neighbouring rows are in
-    one group.
+class Grouped:
+    """Columns (k, n) whose row i belongs to the group ``group[i]``, for sums (fixed_point.Columns). Sums are fast if
+    neighbouring rows are in one group.
     """
 
-    def __init__(self, team: Team) -> None:
+    def __init__(self, team: Team, groups: int) -> None:
+        """Makes the passes for columns with this number of ``groups``."""
         self._largest = Pass(team, _largest, *_LARGEST, size=_ROWS)
         self._limbs = Pass(team, _limbs, *_LIMBS, size=_ROWS)
-        self._scratch = Scratch()
+        self._scratch, self._groups = Scratch(), groups
+        self._columns, self._group = np.zeros((0, 0)), np.zeros(0, np.int32)
 
-    def of(self, columns: Floats, group: Indices, groups: int) -> "Grouped":
-        """Returns ``columns`` (k, n), in C order, for a sum; valid until the next call."""
-        return Grouped(self, columns, group, groups)
-
-    def largest(self, columns: Floats) -> Floats:
-        """(k,) the largest magnitude of each column; see fixed_point.Columns."""
-        k, n = columns.shape
-        found = self._scratch.of(f"largest {k}", self._largest.many(n), np.float64, k)
-        self._largest.run(n, found, columns)
-        return np.asarray(found.max(axis=0, initial=0.0))
-
-    def limbs(self, columns: Floats, group: Indices, groups: int, scale: Floats) -> Ints:
-        """(groups, 2, k) the sums of limbs; see fixed_point.Columns."""
-        k, n = columns.shape
-        words = self._scratch.of(f"limbs {groups} {k}", self._limbs.many(n), np.int64, groups, 2, k)
-        self._limbs.run(n, words, columns, group, scale)
-        return np.asarray(words.sum(axis=0))
-
-
-class Grouped:
-    """Columns of GroupedSums in a sum over all ranks (fixed_point.Columns)."""
-
-    def __init__(self, sums: GroupedSums, columns: Floats, group: Indices, groups: int) -> None:
-        self._sums, self._columns, self._group, self._groups = sums, columns, group, groups
+    def of(self, columns: Floats, group: Indices) -> "Grouped":
+        """Sets the ``columns`` (k, n), in C order, and the ``group`` (n,) of each row; returns the object."""
+        self._columns, self._group = columns, group
+        return self
 
     def largest(self) -> Floats:
-        return self._sums.largest(self._columns)
+        k, n = self._columns.shape
+        found = self._scratch.of("largest", self._largest.many(n), np.float64, k)
+        self._largest.run(n, found, self._columns)
+        return np.asarray(found.max(axis=0, initial=0.0))
 
     def limbs(self, scale: Floats) -> Ints:
-        return self._sums.limbs(self._columns, self._group, self._groups, scale)
+        k, n = self._columns.shape
+        words = self._scratch.of("limbs", self._limbs.many(n), np.int64, self._groups, 2, k)
+        self._limbs.run(n, words, self._columns, self._group, scale)
+        return np.asarray(words.sum(axis=0))
