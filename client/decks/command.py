@@ -68,12 +68,12 @@ def import_deck(
     text = as_json(found, target.name) if as_data else "\n".join(lines(found, target.name)) + "\n"
     echo(text, nl=False)
     save_text(listed, text)
+    made = [target, target.with_name(json_schema.FILE), listed] if written else [listed]
     if written:
         save_text(target, _noted(found).toml)
-        save_text(target.with_name(json_schema.FILE), json_schema.schema_text())
+        save_text(made[1], json_schema.schema_text())
     if not as_data:
-        echo("")
-        echo(f"{'written: ' + str(target) + ', ' if written else ''}{listed}")
+        echo(f"\nwritten: {', '.join(map(str, made))}")
     _end(found, target, written)
 
 

@@ -13,9 +13,10 @@ ENDINGS = (".k", ".key", ".dyn")
 _PLAIN: dict[str, Callable[[str], str | None]] = {".inp": inp.included_by, ".rad": included_by}
 """Endings of the names of other decks, each with a function that recognises a line that includes a file. The lines
 of the included file replace this line."""
-_INCLUDES = re.compile(rb"(?im)^[ \t]*[*#][ \t]*INCLUDE")
-_CHUNK = 1 << 24
-"""Number of bytes that are searched at a time. Chosen value."""
+_INCLUDES = re.compile(rb"(?i)\n(?:\xef\xbb\xbf)?[ \t]*[*#][ \t]*INCLUDE")
+_CHUNK, _LINE = 1 << 20, 200
+"""Number of bytes that are searched at a time, and number of bytes of an incomplete line that are searched again with
+the next bytes. Chosen values: a search needs a few MB of memory for a file of any size."""
 _STANDARD = "*KEYWORD"
 
 
@@ -23,12 +24,13 @@ def includes(path: Path) -> bool:
     """Returns True if a file is a deck that may include other files. Raises OSError."""
     if path.suffix.lower() not in (*ENDINGS, *_PLAIN):
         return False
-    rest = b""
+    rest = b"\n"
     with whole.opened(path) as file:
         while data := file.read(_CHUNK):
-            if _INCLUDES.search(rest + data):
+            text = rest + data
+            if _INCLUDES.search(text):
                 return True
-            rest = data[data.rfind(b"\n") + 1 :][:200]
+            rest = text[text.rfind(b"\n") :][:_LINE]
     return False
 
 

@@ -78,6 +78,22 @@ def files_of(path: Path) -> list[Path]:
     return made.included.files
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_includes_are_found_at_every_place_of_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
+    """The file is searched piece by piece; a line that includes a file may begin in one piece and end in the next."""
+    dice = random.Random(seed)
+    for _ in range(200):
+        monkeypatch.setattr(one_deck, "_CHUNK", dice.randrange(1, 40))
+        long, end = "x" * dice.randrange(300), dice.choice(["", "\n", "\r\n"])
+        line = dice.choice(["*INCLUDE", " * include", "#include a.inc", "*PART"])
+        text = f"{dice.choice(['', chr(0xFEFF)])}{long}{end}{line}\n{long}"
+        (tmp_path / "a.rad").write_text(text, encoding="utf-8", newline="")
+        starts = bool(end) or not long
+        assert one_deck.includes(tmp_path / "a.rad") == ("include" in line.lower() and starts), text
+
+
 def case(path: str, **more: str) -> dict[str, object]:
     return {"parts": [{"mesh": {"shape": "file", "path": path, "unit": "1 mm", **more}}]}
 
