@@ -5,27 +5,27 @@ import math
 from .kernels.jit import njit
 
 T, LOST, DT, LAST_DT, MEAN_DT, SHORTER, STABLE = range(7)
-"""Indices of the clock's numbers in a program of steps (stretch.py); the order is that of ``Clock.numbers``."""
+"""Indices of the clock's numbers in a program of steps (stretch.py). The order is that of ``Clock.numbers``."""
 
 COLLAPSE = 1e-6
-"""Ratio of the stable step to the first stable step; below this ratio a tet counts as crushed and the run ends with an
-error. Chosen value: a run with a million times as many steps would never end."""
+"""Smallest allowed ratio of the stable step to the first stable step. Below this ratio a tet counts as crushed and the
+run ends with an error. Chosen value: a run with a million times as many steps would never end."""
 
 STARVED = 1e-3
-"""Ratio of the stable step to the first stable step below which a warning is given. With such a step the rest of the
-run would take a thousand times as many steps; chosen value: dust and penetration reduce the stable step to a hundredth,
-which needs no warning."""
+"""Ratio of the stable step to the first stable step below which the run gives a warning. With such a step the rest of
+the run would take a thousand times as many steps. Chosen value: dust and penetration reduce the stable step to a
+hundredth, which needs no warning."""
 
 SLOWED = 0.1
-"""Ratio of the stable step to the first stable step; below this ratio the stable step is named as the reason why a run
-has reached its limit of time or of steps. Chosen value: plastic flow and dust reduce the stable step to a third in any
-run."""
+"""Ratio of the stable step to the first stable step, for runs that reach their limit of time or of steps. If the ratio
+is below this value, the run names the stable step as the reason. Chosen value: plastic flow and dust reduce the stable
+step to a third in any run."""
 
 
 @njit("UniTuple(float64, 4)(float64, float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
 def chosen(limit, safety, growth, stable, last_dt, left):  # type: ignore[no-untyped-def]
     """Return the stable step, the next step, the mean of the last and the next step, and a quarter of their difference,
-    s. ``left``: time to the next output, s. See ``Clock.choose``.
+    s. ``left``: simulated time to the next output, s. See ``Clock.choose``.
     """
     stable = min(safety / limit if limit > 0.0 else math.inf, growth * stable)
     dt = min(stable, last_dt)
@@ -36,8 +36,8 @@ def chosen(limit, safety, growth, stable, last_dt, left):  # type: ignore[no-unt
 
 @njit("UniTuple(float64, 2)(float64, float64, float64, float64)", cache=True)
 def advanced(t, lost, dt, target):  # type: ignore[no-untyped-def]
-    """Return the time after a step ``dt``, s, and the rounding error of this time. ``target``: time of the next output,
-    which is reached exactly.
+    """Return the simulated time after a step ``dt``, s, and the rounding error of this time. ``target``: time of the
+    next output, s; the returned time is equal to it if the step ends there.
     """
     increment = dt - lost
     new = t + increment
@@ -47,7 +47,7 @@ def advanced(t, lost, dt, target):  # type: ignore[no-untyped-def]
 
 
 class Clock:
-    """Simulated time, summed with compensation (Kahan), and the time step."""
+    """Simulated time and time step. The time is summed with compensation (Kahan)."""
 
     def __init__(self, end: float, safety: float, growth: float, frames: int) -> None:
         self.t = 0.0
@@ -57,7 +57,8 @@ class Clock:
         self.last_dt = 0.0
         """Time step from n-1 to n, s."""
         self.mean_dt = 0.0
-        """Mean of ``dt`` and ``last_dt``, s. In the kick from v(n-1/2) to v(n+1/2) the forces act for this time."""
+        """Mean of ``dt`` and ``last_dt``, s. In the velocity update from v(n-1/2) to v(n+1/2) the forces act for this
+        time."""
         self.shorter = 0.0
         """A quarter of the difference ``last_dt - dt``, s."""
         self._first = 0.0
@@ -70,7 +71,7 @@ class Clock:
         self.frame = 0
         """Index of the next frame. A step ends exactly at the time of a frame."""
         self._of = -1
-        """Index of the frame to which ``_landing`` and ``_after`` belong."""
+        """Index of the frame for which ``_landing`` and ``_after`` are valid."""
         self._landing = self._after = 0.0
         """Time of the next frame, s; and time of the frame after the next frame, s."""
 
@@ -84,7 +85,7 @@ class Clock:
 
     @property
     def done(self) -> bool:
-        """True if the end time of the run is reached."""
+        """True if the simulated time has reached the end of the run."""
         return self.t >= self._end
 
     def frame_time(self, index: int) -> float:
@@ -99,13 +100,13 @@ class Clock:
         return self.t >= self._landing and self._frames > 0 and self.frame <= self._frames
 
     def choose(self, limit: float) -> float:
-        """Chooses the next time step ``dt`` and returns ``mean_dt``, s. ``limit``: largest value of 1 / stable step of
-        all tets, 1/s; zero if no tet is left.
+        """Chooses the next time step ``dt`` and returns ``mean_dt``, s. ``limit``: largest value over all tets of 1 /
+        stable step, 1/s; zero if no tet is left.
 
         The interval to the next frame is divided into equal steps, as few as are stable. Equal steps create little
         energy, and no step is much shorter than the others. ``growth`` bounds the ratio of two successive stable steps.
-        At the end time, ``dt`` is the step that would be made next. This step is equal to the last step if the last
-        step is still stable, else it is the stable step.
+        At the end time, ``dt`` is the length of the step that would follow. It is equal to the last step if the last
+        step is still stable, else it is equal to the stable step.
         """
         self.last_dt = self.dt
         left = (self._after if self.frame_due else self._landing) - self.t
@@ -117,17 +118,19 @@ class Clock:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """The numbers of the clock for a program of steps, in the order T to STABLE."""
+        """The numbers of the clock for a program of steps (stretch.py), in the order of the indices T to STABLE."""
         return self.t, self._lost, self.dt, self.last_dt, self.mean_dt, self.shorter, self._stable
 
     @property
     def limits(self) -> tuple[float, float, float, float]:
-        """Safety factor, growth factor, stable step that needs a warning, s, and time of the next output, s."""
+        """Four limits: safety factor, growth factor, stable step below which a warning is needed, s, and time of the
+        next output, s.
+        """
         target = self._landing if self._of == self.frame else self.frame_time(self.frame)
         return self._safety, self._growth, STARVED * self._first, target
 
     def go_on(self, steps: int, numbers: list[float]) -> None:
-        """Sets the ``numbers`` of the clock after ``steps`` further steps in a program."""
+        """Sets the clock from ``numbers`` after a program has executed ``steps`` further steps."""
         self.t, self._lost, self.dt, self.last_dt, self.mean_dt, self.shorter, self._stable = numbers
         self.step += steps
 
@@ -145,12 +148,14 @@ class Clock:
 
     @property
     def collapsed(self) -> bool:
-        """True if the stable step is so far below the first stable step that the run would practically never end."""
+        """True if the stable step is so much smaller than the first stable step that the run would practically never
+        end.
+        """
         return self._stable < COLLAPSE * self._first
 
     @property
     def starved(self) -> bool:
-        """True if the stable step is so far below the first stable step that a warning is given."""
+        """True if the stable step is so much smaller than the first stable step that a warning is given."""
         return self._stable < STARVED * self._first
 
     @property
@@ -171,7 +176,7 @@ class Clock:
         return self._stable
 
     def advance(self) -> None:
-        """Adds the chosen step to the time. The time of a frame is set exactly."""
+        """Adds the chosen step to the simulated time. At a frame the time is set to the exact time of the frame."""
         target = self._landing if self._of == self.frame else self.frame_time(self.frame)
         self.t, self._lost = advanced(self.t, self._lost, self.dt, target)
         self.step += 1

@@ -3,10 +3,10 @@ the removed energy and momentum.
 
 A tet is marked in the pass over the elements (elements/wear.py); at this time its force of n+1 is already in the nodal
 sums. The tet is removed before the contact of the next step, so that this contact includes the exposed faces of its
-neighbours; the last force of a removed tet acts in one more velocity update. Therefore the second half of the work of
+neighbours. The last force of a removed tet acts in one more velocity update. Therefore the second half of the work of
 this force is added one step later, as for a boundary. Tets that exceed only a strain or damage limit are collected for
-some steps, because each removal requires new mean normals. If a part has ``erosion.nodes = "strike"``, nodes of the
-part without tets that got a contact impulse are collected in the same steps.
+some steps and are then removed together, because each removal requires new mean normals. If a part has ``erosion.nodes
+= "strike"``, those nodes of the part that have no tets and received a contact impulse are removed in the same steps.
 """
 
 import numpy as np
@@ -29,12 +29,12 @@ from .parallel.ownership import Neighbour, complete
 from .parallel.tags import Tag
 
 GATHERED = 10
-"""Number of steps for which marked tets are collected before they are removed together; chosen value: it is above 1,
+"""Number of steps for which marked tets are collected before they are removed together. Chosen value: it is above 1,
 because each removal requires new mean normals and tests of all candidate pairs."""
 UNDECIDED = 0.25
-"""Ratio of the largest damage to ``erosion.damage`` above which a warning reports that no tet was removed. Chosen
-value: in the example of a punch (docs/theory/erosion.md, Erosion) the damage of the plate is 0.42 and no tet is
-removed; with smaller tets the punch cuts a plug out of the plate."""
+"""Ratio of the largest damage in a part to ``erosion.damage``. If the ratio is above this value and no tet was removed,
+the run gives a warning. Chosen value: in the example of a punch (docs/theory/erosion.md, Erosion) the damage of the
+plate is 0.42 and no tet is removed; with smaller tets the punch cuts a plug out of the plate."""
 
 
 class Erosion:
@@ -52,13 +52,13 @@ class Erosion:
         self._comm, self._clock = comm, clock
         self._specs = [part.erosion for part in case.parts]
         self._struck = np.zeros(model.nodes.n, bool)
-        """(nodes,) particles that are removed because contact has pushed them."""
+        """(nodes,) particles that are removed because they received a contact impulse."""
         self.removal: Removal | None = None
-        """Removal from bodies that break, if the case has such bodies."""
+        """Removal of tets from bodies that break; None if the case has no such bodies."""
         self.removed = np.zeros(model.nodes.n, bool)
-        """(nodes,) whether each node is removed. The velocity of a removed node is zero."""
+        """(nodes,) True for each node that is removed. The velocity of a removed node is zero."""
         self._tets_at = self._completed([block.tets.astype(np.int64) for block in model.blocks])
-        # A copy and its parent have tets. The tets of a copy are counted before their number is used.
+        # A copy and its parent have tets. The number of tets of a copy is counted before it is used.
         model.nodes.columns.declare(self, removed=COPIED, _struck=COPIED, _tets_at=COPIED)
         self._leaving: tuple[Ints, Floats] = np.zeros(0, np.int64), np.zeros((0, 3))
         """Nodes that are removed in this step, and their velocities v(n-1/2), m/s."""
@@ -98,9 +98,9 @@ class Erosion:
         self._release()
 
     def strikes(self) -> int:
-        """Marks nodes without tets that contact pushed in this step, in parts with ``erosion.nodes = "strike"``. This
-        function must be called after contact. Returns TIRED (elements/wear.py) if nodes of this rank must be removed,
-        else SOUND.
+        """Marks nodes that have no tets and received a contact impulse in this step, in parts with ``erosion.nodes =
+        "strike"``. This function must be called after contact. Returns TIRED (elements/wear.py) if nodes of this rank
+        must be removed, else SOUND.
         """
         loose = np.flatnonzero(self._loose)
         if self._contact is not None:
@@ -141,7 +141,7 @@ class Erosion:
 
     @property
     def idle(self) -> bool:
-        """True if no tet or node must be removed, no work must be added later, and all nodes have tets."""
+        """True if no tet or node must be removed, no work of a removal must be added later, and all nodes have tets."""
         return not (self.due or self.account.outstanding or (self._tets_at == 0).any())
 
     def note(self, state: Nodes) -> None:
@@ -165,7 +165,7 @@ class Erosion:
         state.v[self.removed] = 0.0
 
     def _remove(self, state: Nodes) -> None:
-        """Removes the marked tets. Removes also the nodes that have lost all their tets, if their part requires this.
+        """Removes the marked tets. Also removes the nodes that have lost all their tets, if their part requires this.
         Collective.
         """
         blocks, none = self._model.blocks, np.zeros((0, exposure.WORDS), np.int64)
@@ -188,7 +188,9 @@ class Erosion:
             self.removal.end(gone, self._tets_at > 0)
 
     def _drop(self, worn: list[Ints], x: Floats) -> None:
-        """Books and removes the tets ``worn`` of each block; ``x`` (nodes, 3): positions."""
+        """Adds the energies of the tets ``worn`` of each block to the account, and removes these tets. ``x`` (nodes,
+        3): positions, m.
+        """
         for index, (block, places) in enumerate(zip(self._model.blocks, worn, strict=True)):
             if len(places):
                 self.account.add_tets(block, places, x)
@@ -197,8 +199,8 @@ class Erosion:
                     self.removal.drop(index, moves)
 
     def _count(self, left: list[Ints]) -> None:
-        """Updates the numbers of tets after the removal of the tets ``left``. The number of a copy of a node is not
-        known before: if nodes can separate, all tets are counted. Collective.
+        """Updates the number of tets at each node after the removal of the tets ``left``. If nodes can separate, all
+        tets are counted again, because the number of tets of a copy of a node is not stored. Collective.
         """
         if self.removal is None:
             self._tets_at -= self._completed(left)
@@ -223,11 +225,11 @@ class Erosion:
 
     @property
     def _loose(self) -> Flags:
-        """(nodes,) whether each node is a particle: it has no tets and is not removed."""
+        """(nodes,) True for each particle; a particle is a node that has no tets and is not removed."""
         return np.asarray((self._tets_at == 0) & ~self.removed)
 
     def _release(self) -> None:
-        """Declares the nodes without tets as particles in all boundaries."""
+        """Sets the nodes without tets as particles in all boundaries."""
         for bound in self._bounds:
             bound.release(self._loose, self._bounds)
 
@@ -241,7 +243,7 @@ class Erosion:
                 bound.drop(gone)
 
     def _completed(self, tets: list[Ints]) -> Ints:
-        """(nodes,) number of the given ``tets`` at each node, counted over all ranks. Collective."""
+        """(nodes,) number of tets in ``tets`` at each node, counted over all ranks. Collective."""
         corners = np.concatenate([np.zeros(0, np.int64), *(rows.reshape(-1) for rows in tets)])
         counts = np.bincount(corners, minlength=self._model.nodes.n)[:, None].astype(np.int64)
         complete(self._comm, self._neighbours, counts, Tag.TETS_AT_NODE)

@@ -36,18 +36,18 @@ class ErosionAccount:
         mass, speed, arm = extremes
         energy, momentum, spin = mass * speed * speed, mass * speed, mass * speed * arm
         self.work = Tally(np.full(len(WORKS) + 1, energy))
-        """Sums of WORKS over the removed tets, J; also the sum of the heat of removed tets whose equation of state
-        depends on heat, J."""
+        """Sums over the removed tets: the energies WORKS, J, and the heat of tets whose equation of state depends on
+        heat, J."""
         self.nodal = Tally(np.array([energy, mass, *[momentum] * 3, *[spin] * 3]))
         """Energy, J, mass, kg, momentum, kg m/s, and angular momentum, kg m^2/s, of the removed nodes."""
         self._half = self.nodal.quanta(np.zeros((0, len(self.nodal.scale))))
         """Second half of the energy and momenta of the last removal, quanta."""
         self._last: list[tuple[Ints, Floats]] = []
-        """Nodes (k, 4) of the tets of the last removal, and the last forces (k, 4, 3) of these tets, N."""
+        """Nodes (k, 4) of the tets of the last removal, and the last nodal forces (k, 4, 3) of these tets, N."""
 
     @property
     def outstanding(self) -> bool:
-        """Whether the second half of the work of a removal must still be added."""
+        """True if the second half of the work of a removal must still be added."""
         return bool(self._last or self._half.any())
 
     def note(self, state: Nodes) -> None:
@@ -64,7 +64,9 @@ class ErosionAccount:
         self._half[:] = 0
 
     def add_tets(self, block: Block, worn: Ints, x: Floats) -> None:
-        """Adds the energies of the tets ``worn`` of a block, before these tets are removed."""
+        """Adds the energies of the tets ``worn`` of a block. This function must be called before these tets are
+        removed.
+        """
         self._last.append((block.tets[worn].astype(np.int64), _forces(block, worn, x)))
         self.work.add(_energies(block, worn))
 
@@ -110,7 +112,7 @@ def _rows(block: Block, chosen: Ints, rows: "np.ndarray") -> Floats:
 
 
 def _energies(block: Block, chosen: Ints) -> Floats:
-    """(k, 5) WORKS of the chosen tets, J, and the heat on which their pressure depends, J."""
+    """(k, 5) the energies WORKS of the chosen tets, J, and the heat on which their pressure depends, J."""
     none = np.zeros(len(chosen))
     found = {row: block.at(row, chosen) if block.has(row) else none for row in WORKS}
     heat = found[WORK_VISCOUS] + found[WORK_PLASTIC] if EQUATIONS[block.eos] is GRUNEISEN else none
@@ -118,7 +120,9 @@ def _energies(block: Block, chosen: Ints) -> Floats:
 
 
 def _forces(block: Block, chosen: Ints, x: Floats) -> Floats:
-    """(k, 4, 3) nodal forces -V stress grad N of the chosen tets, N."""
+    """(k, 4, 3) forces of the chosen tets on their nodes, -V stress grad N, N. V is the volume, N in the gradient the
+    shape function.
+    """
     values = _rows(block, chosen, np.arange(VISCOUS + 1))
     stress = np.empty((len(chosen), 3, 3))
     pressure = values[:, PRESSURE] + values[:, VISCOUS]

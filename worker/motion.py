@@ -1,4 +1,4 @@
-"""Kick and move of the nodes: velocities and positions are changed in place."""
+"""Kick (velocity update) and move (position update) of the nodes. Velocities and positions are changed in place."""
 
 from .kernels.jit import njit, types
 from .model.state import Nodes
@@ -38,28 +38,28 @@ def _move(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 
 class Leapfrog:
-    """Kick and move of the nodes of a rank, on the threads of its ``team``."""
+    """Kick (velocity update) and move (position update) of the nodes of a rank, on the threads of its ``team``."""
 
     def __init__(self, team: Team) -> None:
         self._kick, self._move = Pass(team, _kick, *_KICK), Pass(team, _move, *_MOVE)
 
     def kick(self, nodes: Nodes, impulse_quantum: float, shorter: float) -> None:
-        """Computes v*(n+1/2) from v(n-1/2) and f(n). ``impulse_quantum``: mean of the two time steps divided by the
-        force scale, N s. ``shorter``: (dt(n-1/2) - dt(n+1/2)) / 4 divided by the force scale. Adds to ``stepping``, J,
-        the first part of the work of f(n) that is caused by unequal steps.
+        """Computes v*(n+1/2) from v(n-1/2) and the force f(n). ``impulse_quantum``: mean of the two time steps divided
+        by the force scale, N s. ``shorter``: (dt(n-1/2) - dt(n+1/2)) / 4 divided by the force scale. Adds to
+        ``stepping``, J, the first part of the work of f(n) that is caused by unequal time steps.
         """
         self._kick.run(nodes.n, nodes.v, nodes.force, nodes.mass, nodes.stepping, impulse_quantum, shorter)
 
     def kicking(self, nodes: Nodes, impulse_quantum: Follow, shorter: Follow) -> Stage:
-        """Returns the work of ``kick`` as a stage of a program."""
+        """Returns the kernel of ``kick`` as a stage of a program (parallel/program.py)."""
         return self._kick.stage(nodes.n, nodes.v, nodes.force, nodes.mass, nodes.stepping, impulse_quantum, shorter)
 
     def move(self, nodes: Nodes, dt: float, shorter: float) -> None:
-        """Computes x(n+1) from x(n) with the time step ``dt``, s. Adds to ``stepping`` the second part of the work of
-        f(n) that is caused by unequal steps; then sets the forces to zero.
+        """Computes x(n+1) from x(n) with the time step ``dt``, s. Adds to ``stepping`` , J, the second part of the work
+        of f(n) that is caused by unequal time steps. Then sets the forces to zero.
         """
         self._move.run(nodes.n, nodes.x, nodes.v, nodes.force, nodes.stepping, dt, shorter)
 
     def moving(self, nodes: Nodes, dt: Follow, shorter: Follow) -> Stage:
-        """Returns the work of ``move`` as a stage of a program."""
+        """Returns the kernel of ``move`` as a stage of a program (parallel/program.py)."""
         return self._move.stage(nodes.n, nodes.x, nodes.v, nodes.force, nodes.stepping, dt, shorter)

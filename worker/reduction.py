@@ -2,10 +2,10 @@
 same decisions.
 
 The reduction takes the maximum of int64 words over all ranks. Each field of the reduction is one word: an integer, a
-flag (0 or 1), or the bit pattern of a float64 that is not negative. As integers, the bit patterns of non-negative
-floats have the order of the floats, and a NaN is larger than any number, so the maximum of the words is the maximum of
-the values for every field. If parts fracture, there is one more word for each rank. If there is contact, a sum of six
-words is reduced at the same time. A run with a single rank sends no message.
+flag (0 or 1), or the bit pattern of a float64 that is not negative. Read as integers, the bit patterns of non-negative
+floats have the order of the floats, and a NaN is larger than any number. Therefore the maximum of the words is the
+maximum of the values for every field. If parts fracture, the reduction has one more word for each rank. If the case has
+contact, the sum of six further words is computed at the same time. A run with a single rank sends no message.
 """
 
 import struct
@@ -23,44 +23,44 @@ the contact sweeps."""
 
 
 class Fields:
-    """The fields of the reduction."""
+    """Fields of the reduction."""
 
     def __init__(self) -> None:
         """Sets all fields to zero, which means no limit and no request."""
         self.limit = 0.0
-        """Largest value of 1 / stable step of all tets, 1/s; the value is NaN if some tet is inverted or has a value
+        """Largest value over all tets of 1 / stable step, 1/s. The value is NaN if a tet is inverted or has a value
         that is not a number."""
         self.force = 0.0
-        """Largest contribution to a nodal force, N."""
+        """Largest force that a tet contributes to a node, N."""
         self.stop = 0
-        """Number of the reason to stop the run; 0 if there is no reason (worker/run/stops.py). Of several reasons the
-        largest number is used."""
+        """Number of the reason to stop the run; 0 if there is no reason (worker/run/stops.py). If there are several
+        reasons, the largest number is used."""
         self.report = False
-        """Rank 0 requests the loads of all ranks."""
+        """Request of rank 0: all ranks report their loads."""
         self.groups = False
-        """Rank 0 also requests the loads of groups."""
+        """Request of rank 0: all ranks also report the loads of their groups of tets."""
         self.approach = 0.0
-        """Largest value of 1 / (time in which a node passes half of the tet that it hits), 1/s."""
+        """Largest value of 1 / (time in which a node passes through half of the tet that it hits), 1/s."""
         self.opening = False
-        """A crack has opened so wide that its two sides become surface."""
+        """True if a crack has opened so wide that its two sides become surface."""
         self.stray = False
-        """A contact node (slot) will leave its skin in the next step. Therefore its candidate pairs must be searched
-        again."""
+        """True if a contact node (slot) will leave its skin in the next step, so that its candidate pairs must be
+        searched again."""
         self.search = False
-        """The surface of a rank has moved further than the last broad phase allows. Therefore a new broad phase is
-        needed."""
+        """True if the surface of a rank has moved further than the last broad phase allows, so that a new broad phase
+        is needed."""
         self.worn = 0
         """State of the tets that erosion will remove: SOUND, TIRED or BROKEN (elements/wear.py)."""
         self.breaking = 0
         """State of the facets: NOTHING, OVERSTRESSED or BREAKS (fracture/stage.py)."""
         self.grown = False
-        """A rank has more surface nodes than the load balance allows."""
+        """True if a rank has more surface nodes than the load balance allows."""
         self.checkpoint = False
-        """A checkpoint is requested."""
+        """True if a checkpoint is requested."""
         self.snapshot = False
-        """A snapshot of the fragments is scheduled."""
+        """True if a snapshot of the fragments is scheduled."""
         self.apart = False
-        """A bond of a tied node has failed (bonds/stage.py)."""
+        """True if a bond of a tied node has failed (bonds/stage.py)."""
         self.nodes = 0
         """Number of nodes on all ranks. After a node separation, ranks without a separated node receive the new number
         of nodes in this field."""
@@ -87,7 +87,7 @@ class Offer(Fields):
         """``ranks``: number of ranks of the run."""
         super().__init__()
         self.touched: Ints = np.zeros(ranks, np.int64)
-        """(ranks,) not zero for the ranks that have a node of the facets that break (fracture/separation.py)."""
+        """(ranks,) not zero for each rank that has a node of a facet that breaks (fracture/separation.py)."""
         self.sums: Ints = np.zeros(_COSTS + _UNSETTLED, np.int64)
         self.costs: Ints = self.sums[:_COSTS]
         """(4,) energies that contact took from the bodies on this rank (contact/account.py)."""
@@ -96,18 +96,18 @@ class Offer(Fields):
 
 
 class StepReduction(Fields):
-    """Result of the last reduction, equal on all ranks. ``own`` is the contribution of this rank to the next
-    reduction.
+    """Result of the last reduction, equal on all ranks. The attribute ``own`` is the contribution of this rank to the
+    next reduction.
     """
 
     def __init__(self, ranks: int = 1, *, fractures: bool = True, contact: bool = True) -> None:
-        """``ranks``: number of ranks; ``fractures``, ``contact``: whether the case has fracture, and contact."""
+        """``ranks``: number of ranks; ``fractures``, ``contact``: True if the case has fracture, or contact."""
         super().__init__()
         self.own = Offer(ranks)
         self._alone, self._contact = ranks == 1, contact
         self._given, self._agreed = (np.zeros(len(NAMES) + ranks * fractures, np.int64) for _ in range(2))
         self.touched: Ints = self.own.touched if self._alone else self._agreed[len(NAMES) :]
-        """(ranks,) maximum over the contributions of all ranks."""
+        """(ranks,) maximum over all ranks of the words that mark the ranks with breaking facets."""
         self._sums: Ints = np.zeros(_COSTS + _UNSETTLED, np.int64)
         self.costs: Ints = self._sums[:_COSTS]
         """(4,) sum over all ranks of the energies that contact took from the bodies."""
@@ -116,7 +116,9 @@ class StepReduction(Fields):
         self._pending: list[Pending] = []
 
     def keep(self) -> Ints:
-        """Returns (fields,) words of the result for a checkpoint. The words do not depend on the number of ranks."""
+        """Returns (fields,) the words of the result, for a checkpoint. The words do not depend on the number of
+        ranks.
+        """
         words = np.zeros(len(NAMES), np.int64)
         self.pack(words)
         return words
@@ -148,8 +150,8 @@ class StepReduction(Fields):
         self.unpack(self._agreed)
 
     def begin_again(self) -> None:
-        """Clears the requests that were executed before the checkpoint, so that a resumed run does not repeat a stop or
-        a report. Requests a broad phase, because a resumed run starts with a broad phase.
+        """Clears the requests that were executed before the checkpoint, so that a resumed run does not execute a stop
+        or a report again. Requests a broad phase, because a resumed run starts with a broad phase.
         """
         self.stop = 0
         self.report = self.groups = self.stray = self.grown = self.checkpoint = self.snapshot = self.apart = False

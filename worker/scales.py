@@ -1,4 +1,4 @@
-"""Orders of magnitude of a model; the quanta of integer sums are computed from them."""
+"""Orders of magnitude of a model, from which the quanta of integer sums are computed."""
 
 import math
 
@@ -11,13 +11,13 @@ from .model.state import Model
 from .parallel.comm import Comm
 
 _SMALLEST_STRAIN = 1e-12
-"""Smallest strain that the force quantum must resolve in the nodal forces; chosen value: in steel, the stress at this
-strain is 0.2 Pa."""
+"""Smallest strain whose nodal forces the force quantum must resolve. Chosen value: in steel, the stress at this strain
+is 0.2 Pa."""
 
 
 def extremes(model: Model, comm: Comm) -> tuple[float, float, float]:
-    """Returns three maxima over all ranks: nodal mass, kg; wave speed or velocity, m/s; and distance from the origin,
-    m.
+    """Returns three maxima over all ranks: nodal mass, kg; speed (wave speed or velocity), m/s; and distance from the
+    origin, m.
     """
     speeds = [float(np.linalg.norm(model.nodes.v, axis=1).max(initial=0.0))]
     for block in model.blocks:
@@ -29,8 +29,8 @@ def extremes(model: Model, comm: Comm) -> tuple[float, float, float]:
 
 
 def force_floor(model: Model, comm: Comm) -> float:
-    """Returns the nodal force of the largest tet at the strain _SMALLEST_STRAIN, N; the force quantum is refined down
-    to this force.
+    """Returns the nodal force of the largest tet at the strain _SMALLEST_STRAIN, N. The force quantum is never made
+    smaller than this force requires.
 
     Collective.
     """

@@ -1,5 +1,5 @@
-"""The simulation of one rank: model, pressure form, boundaries, contact, fracture and accounts; it is built once and
-used by the time step (step.py).
+"""The simulation of one rank: model, pressure form, boundaries, contact, fracture and accounts. The simulation is built
+once and used by the time step (step.py).
 """
 
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ from .scene.assembly import Say, quiet
 
 
 class Stage(Protocol):
-    """Interface of a stage of the simulation. A stage may have state by node, by tet or in tables of its own."""
+    """Interface of a stage of the simulation. A stage may have state by node, by tet, or in its own tables."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the state of the stage to a parcel (a checkpoint or migration message)."""
@@ -82,17 +82,17 @@ class Simulation:
     probes: Probes
     timers: Timers
     record: Record | None
-    """Record of the fragments."""
+    """Record of the fragments; None if no part fractures."""
     crushing: Crushing | None
     neighbours: list[Neighbour]
     assembled: float
-    """CPU time that the slowest rank needed to build the stages, s."""
+    """CPU time that the slowest rank used to build the stages, s."""
     floor: float
-    """Force, N, down to which the force quantum is refined. If all forces are smaller, the quantum is not refined
-    further."""
+    """Force, N, that limits the force quantum from below. If all forces are smaller than this force, the quantum is not
+    made smaller."""
     reduction: StepReduction
     warnings: tuple[str, ...] = ()
-    """Warnings about the meshes. A run that resumes has no such warnings."""
+    """Warnings about the meshes. A resumed run has no such warnings."""
     _acts: Acts | None = None
 
     @property
@@ -104,7 +104,7 @@ class Simulation:
 
     @property
     def scale(self) -> float:
-        """Number of quanta per newton of the present nodal forces."""
+        """Number of quanta per newton in the present nodal forces."""
         return self.model.nodes.scale
 
     @scale.setter
@@ -113,13 +113,13 @@ class Simulation:
 
     @property
     def limit(self) -> float:
-        """Largest value of 1 / stable step of tets and contact, 1/s."""
+        """Largest value of 1 / stable step, over all tets and contacts, 1/s."""
         return max(self.reduction.limit, self.contact.limit) if self.contact is not None else self.reduction.limit
 
     @property
     def pushing(self) -> "list[Boundary | Contact | Rigid]":
-        """All objects that apply impulses to nodes. Each object has the attribute ``last_push``, the time of its last
-        impulse.
+        """All objects that apply impulses to nodes. Each object has the attribute ``last_push``, which is the time of
+        its last impulse, s.
         """
         return [*self.boundaries, *(each for each in (self.contact, self.rigid) if each is not None)]
 
@@ -130,8 +130,8 @@ class Simulation:
         return [each for each in found if each is not None]
 
     def limiting_id(self) -> int:
-        """Returns the id of the tet that limits the time step; of several such tets the smallest id; -1 if no tet
-        limits the time step. Collective."""
+        """Returns the id of the tet that limits the time step; -1 if no tet limits the time step. If several tets have
+        the same limit, the smallest id is returned. Collective."""
         mine = self.elements.limit_bits == fixed_point.bits_of(self.reduction.limit)
         first = self.comm.maximum(np.array([-float(self.elements.limiting) if mine else -np.inf]))[0]
         return -1 if np.isinf(first) or not self.model.elements_global else -int(first)
@@ -164,7 +164,7 @@ class Simulation:
         return int(self.comm.sum(np.array([(shared & self.model.nodes.owned).sum()]))[0])
 
     def count_nodes(self) -> None:
-        """Sets ``nodes_global`` to the same number on all ranks, as the reduction of the next step would.
+        """Sets ``nodes_global``, the number of nodes on all ranks, before the reduction of the next step sets it.
         Collective.
         """
         most = self.comm.maximum(np.array([float(self.model.nodes_global)]))
@@ -177,13 +177,13 @@ class Simulation:
                 each.free()
 
     def next_scale(self) -> float:
-        """Returns the number of quanta per newton for the next sum of forces."""
+        """Returns the number of quanta per newton that the next sum of forces uses."""
         return float(fixed_point.scale_for(max(self.reduction.force, self.floor)))
 
 
 def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
-    """Makes the mesh of a case, divides it among the ranks, and builds the stages. Rank 0 reports its progress by calls
-    of ``say``.
+    """Makes the mesh of a case, divides it among the ranks, and builds the stages. Rank 0 reports the progress by calls
+    of the function ``say``.
 
     Raises the same InputError on every rank.
     """

@@ -30,9 +30,10 @@ between the halves. After the last step, rows 1 to 10 are executed once more, an
 - Rows 12 and 13 are one pass over each chunk of tets; the averaged pressure forms need two passes, and exchange
   the nodal volume sums between the two passes.
 - Row 14 starts after the border tets and ends after the interior tets, before the fracture criterion. The criterion is
-  computed before the reduction, which then contains whether any facet breaks, and which ranks have a node of such a
-  facet.
-- Broken facets that have opened wide enough to be surface are found in row 8 and become surface after the reduction.
+  computed before the reduction. The reduction then transfers whether any facet breaks, and which ranks have a node of
+  such a facet.
+- Row 8 finds the broken facets that have opened wide enough to be surface. The sides of these facets become surface
+  after the reduction.
 """
 
 import math
@@ -119,7 +120,7 @@ def _before_kick(sim: Simulation, acts: Acts) -> None:
         if bonds is not None and removes:
             bonds.follow()
     if bonds is not None:
-        bonds.note(nodes)  # Row 2 for the tied bonds. After row 3 only nodes that are still tied count.
+        bonds.note(nodes)  # Row 2 for the tied bonds. After row 3 only nodes that are still tied are used.
     if contact is not None:
         contact.search_if_due(nodes)  # Row 4: update the candidate pairs of the present surface.
 
@@ -164,10 +165,10 @@ def second_half(sim: Simulation) -> None:
 
 
 def complete(sim: Simulation) -> None:
-    """Executes rows 14 and 15 of the table, which are the completion of shared nodes, the reduction, and fracture.
-    Raises PhysicsError if a tet has failed.
+    """Executes rows 14 and 15 of the table: completion of shared nodes, reduction, and fracture. Raises PhysicsError if
+    a tet has failed.
 
-    A step of a program (stretch.py) ends with this function.
+    The last step of a program (stretch.py) ends with this function.
     """
     _offer_contact(sim)
     _reduce(sim, sim.fracture)
@@ -218,8 +219,8 @@ def _offer_contact(sim: Simulation) -> None:
 
 
 def _offer(sim: Simulation, fracture: Fracture | None) -> None:
-    """Sets the contribution of all other stages on this rank to the reduction (row 14 of the table). With fracture,
-    first the forces of shared nodes are completed, and the facets that break are found.
+    """Sets the contribution of all other stages on this rank to the reduction (row 14 of the table). If parts fracture,
+    this function first completes the forces of shared nodes and finds the facets that break.
     """
     elements, own = sim.elements, sim.reduction.own
     own.breaking = OVERSTRESSED if elements.hot else NOTHING
@@ -254,7 +255,7 @@ def _follow_reduction(sim: Simulation) -> None:
 
 
 def _sum_again(sim: Simulation) -> None:
-    """Repeats the sum of the forces (rows 13 and 14 of the table) in a larger quantum, if the largest force is too
+    """Repeats the sum of the forces (rows 13 and 14 of the table) with a larger quantum, if the largest force is too
     large for the present quantum.
     """
     sim.scale = fixed_point.scale_for(sim.reduction.force)

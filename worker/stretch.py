@@ -1,8 +1,8 @@
 """Quiet steps as one compiled program.
 
-A step is quiet if no other code than its kernels is needed: no output, no request, no tet removed, no facet
-overstressed. The program (parallel/program.py) executes the rows 11 to 14 of step.py, and after them the rows 1 to 9 of
-the next step, again and again, with the kernels that step.py uses:
+A step is quiet if it needs no code outside of its kernels: it has no output, no request, no removed tet, and no
+overstressed facet. The program (parallel/program.py) executes the rows 11 to 14 of step.py, and after them the rows 1
+to 9 of the next step, again and again, with the kernels that step.py uses:
 
 ::
 
@@ -11,8 +11,9 @@ the next step, again and again, with the kernels that step.py uses:
                            +-> end of the program: step.complete executes the rows 14 and 15 of the present step
 
 ``decide`` (stretch_numbers.py) is the reduction and the choice of the time step; it writes time, step and scale into
-the tables of the other stages. The threads stay awake between the stages, and a step costs no call from Python. The
-answer is the same to the bit. Runs with several ranks, rigid bodies, bonds or moving walls have no program.
+the tables of the other stages. The threads stay awake between the stages, and a step needs no call from Python. The
+results are bit-identical to those of step.py. Runs with several ranks, rigid bodies, bonds or moving walls have no
+program.
 """
 
 import time
@@ -56,20 +57,21 @@ from .stretch_numbers import (
 )
 
 _POLL = 0.05
-"""Largest wall time of a program, s; with the chosen value the answer to a signal comes after a time that no user
-notices."""
+"""Largest wall time of one program, s. Chosen value: a user does not notice a delay of this length in the answer to a
+signal."""
 _SHORT, _PAUSE = 4, 16
-"""A program is begun only if no output is scheduled within _SHORT steps. After an event in a program of fewer steps,
-the next _PAUSE steps are executed without a program, so that a scene that is quiet only for short times spends no time
-on programs. Chosen values: to begin a program takes as long as a step of a small scene."""
+"""A program is started only if no output is scheduled within the next _SHORT steps. If an event ends a program after
+fewer than _SHORT steps, the next _PAUSE steps are executed without a program. Therefore a scene that is quiet only for
+short times spends no time on programs. Chosen values: the start of a program takes as long as a step of a small
+scene."""
 
 
 _ONE: Ints = np.ones(1, np.int64)
-"""Length of the range of a stage that one thread runs."""
+"""Number of indices in the range of a stage that one thread runs."""
 
 
 class Until(NamedTuple):
-    """First time at which code outside of the program is needed."""
+    """First simulated time, wall time and step number at which code outside of the program is needed."""
 
     wall: float
     """Wall time, s."""
@@ -128,7 +130,7 @@ class Stretch:
         return steps
 
     def _is_quiet(self, until: Until) -> bool:
-        """Returns whether a program is useful; it is not useful if code outside of the program is needed at the end of
+        """Returns True if a program is useful. A program is not useful if code outside of it is needed at the end of
         the present step.
         """
         sim, clock = self._sim, self._sim.clock
@@ -139,7 +141,7 @@ class Stretch:
         return (sim.fracture is None or sim.fracture.intact) and (sim.erosion is None or sim.erosion.idle)
 
     def _parts(self) -> list[_Part] | None:
-        """Returns the stages of the program; None if a stage needs code outside of kernels."""
+        """Returns the stages of the program; None if a stage needs code outside of its kernels."""
         sim, nodes = self._sim, self._sim.model.nodes
         ending = sim.elements.ending(Follow(SCALE))
         acting = self._acting(sim.acts.before_contact), self._acting(sim.acts.after_contact)
@@ -178,7 +180,7 @@ class Stretch:
         numbers[NEXT] = min(until.t, numbers[LANDING])
 
     def _tie(self, parts: list[_Part]) -> None:
-        """Connects the tables of all stages with the numbers."""
+        """Connects the argument tables of all stages with the numbers of the program."""
         ties = [tie for each in parts if isinstance(each.stage, Stage) for tie in each.stage.ties]
         self._ties = Ties(
             np.array([tie.number for tie in ties]), np.array([tie.factor for tie in ties]),
@@ -189,8 +191,8 @@ class Stretch:
         self._sim.elements.scratches.peaks[:] = 0
 
     def _end(self, parts: list[_Part], spent: Ints) -> None:
-        """Sets the simulation to the state in which the program ended. ``spent`` (parts, 2): time of each stage outside
-        of parallel regions and in parallel regions, ns.
+        """Sets the simulation to the state in which the program ended. ``spent`` (parts, 2): wall time of each stage
+        outside of parallel regions and in parallel regions, ns.
         """
         sim, steps = self._sim, int(self._words[STEPS])
         sim.clock.go_on(steps, self._numbers[: len(sim.clock.numbers)].tolist())

@@ -16,28 +16,26 @@ from .parallel.team import TASK
 from .parallel.words import now, write_real
 
 SCALE, NEXT_SCALE, IMPULSE_QUANTUM, SHORTER_QUANTUM = range(STABLE + 1, STABLE + 5)
-"""Indices of numbers that follow those of the clock: quanta per newton of the present forces, and of the next forces;
-mean of two steps divided by the scale, N s; a quarter of the difference of two steps divided by the scale
-(motion.py)."""
+"""Indices of the numbers that follow those of the clock: quanta per newton of the present forces, and of the next
+forces; mean of two time steps divided by the scale, N s; a quarter of the difference of two time steps divided by the
+scale (motion.py)."""
 SAFETY, GROWTH, LEAST_STABLE, LANDING, NEXT, FLOOR, MANY = range(SHORTER_QUANTUM + 1, SHORTER_QUANTUM + 8)
-"""Indices of numbers that are constant in a program: limits of the clock (``Clock.limits``); time of the first output
-or request, s; force, N, down to which the scale is refined. MANY: the number of all numbers."""
+"""Indices of numbers that are constant in a program: limits of the clock (``Clock.limits``); simulated time of the
+first output or request, s; force, N, that limits the force quantum from below. MANY: count of all numbers."""
 STOP, CONTROL, STEPS, MOST_STEPS, DEADLINE, TIME = range(6)
 """Indices of the words of a program: 0, or the reason why the program ends; number of the next stage
 (parallel/program.py); number of steps so far, and largest number of steps; wall time at which the program ends, ns; two
-words for reading the clock."""
+words in which the wall clock is read."""
 SCHEDULED, EVENT = 1, 2
 """Reasons why a program ends."""
 SIZE = TIME + 2
-"""Number of words."""
+"""Count of the words of a program."""
 _END = 1 << 62
-"""Number of a stage beyond the last one: ends the program."""
+"""Number of a stage that does not exist; it ends the program."""
 
 
 class Ties(NamedTuple):
-    """Words in the argument tables of all stages that change with the numbers of the program
-    (parallel/arguments.py).
-    """
+    """Words in the argument tables of all stages that depend on the numbers of the program (parallel/arguments.py)."""
 
     number: Ints
     """(k,) index of the number that determines each word."""
@@ -50,13 +48,16 @@ class Ties(NamedTuple):
 _F1, _I1, _I2 = types.float64[::1], types.int64[::1], types.int64[:, ::1]
 _TIES = record(Ties, _I1, _F1, _I1)
 DECIDE = _I1, _F1, _I2, _TIES
-"""Types of the arguments of ``decide``: words, numbers, peaks of each thread (elements/records.py), ties."""
+"""Types of the arguments of ``decide``: words, numbers, peaks of each thread (elements/records.py), and ties of the
+words in argument tables."""
 _of_decide = reader(*DECIDE)
 
 
 @njit(types.void(_F1, _TIES), cache=True, error_model="numpy")
 def spread(numbers, ties):  # type: ignore[no-untyped-def]
-    """Computes the quanta from the steps and the scale. Writes the numbers into the tables of the stages."""
+    """Computes the force quanta from the time steps and the scale. Writes the numbers into the argument tables of the
+    stages.
+    """
     numbers[IMPULSE_QUANTUM] = numbers[MEAN_DT] / numbers[SCALE]
     numbers[SHORTER_QUANTUM] = numbers[SHORTER] / numbers[SCALE]
     for k in range(len(ties.number)):
@@ -80,8 +81,9 @@ def _ends(words, numbers, peaks):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def decide(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: the stage after the elements. It advances the time. Then it either ends the program, or chooses the next
-    step as step.py does and prepares all tables for this step.
+    """Task: executes the stage ``decide``, which follows the elements. It advances the simulated time. Then it either
+    ends the program, or chooses the next time step in the same way as step.py and prepares all argument tables for this
+    step.
     """
     words, numbers, peaks, ties = _of_decide(table)
     gather_peaks(peaks)

@@ -1,3 +1,3 @@
-"""Contact of bodies. The packages are the surface, the broad phase, the narrow phase and the solver of the impulses;
-surfaces of other ranks are present as ghosts.
+"""Contact of bodies. The packages are the surface, the broad phase, the narrow phase, and the solver of the impulses.
+Surfaces of other ranks are present as ghosts.
 """

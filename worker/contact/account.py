@@ -1,4 +1,4 @@
-"""Account of the energy that contact has taken from the bodies; when contact corrects penetrations, it may return at
+"""Account of the energy that contact has taken from the bodies. When contact corrects penetrations, it may return at
 most this energy to the bodies.
 """
 
@@ -8,13 +8,13 @@ from ..model.state import Ints
 from ..parallel.fixed_point import Tally
 
 _AHEAD = 2.0
-"""Safety factor. Penetrations are corrected only while the energy in the account exceeds this factor times the largest
-energy that contact has returned in one step so far."""
+"""Safety factor of the account. Penetrations are corrected only while the energy in the account exceeds this factor
+times the largest energy that contact has returned in one step so far."""
 
 
 class Account:
-    """Sums over all contacts, steps and ranks; they are integers, so they do not depend on the order of summation and
-    on the partition.
+    """Sums over all contacts, steps and ranks. The sums are integers, so they do not depend on the order of summation
+    and on the partition.
     """
 
     def __init__(self, energy: float) -> None:
@@ -35,11 +35,11 @@ class Account:
         return float(self._tally.scale[0])
 
     def carry(self) -> None:
-        """Moves the overflow of the low limbs to the high limbs; see Tally."""
+        """Moves the overflow of the low limbs to the high limbs; see the class Tally."""
         self._tally.carry()
 
     def settle(self, words: Ints) -> bool:
-        """Returns whether contact may correct penetrations in the next step. ``words`` (2, 2): sum of the words of all
+        """Returns True if contact may correct penetrations in the next step. ``words`` (2, 2): sum of the words of all
         ranks.
 
         Correction is allowed while the energy taken from the bodies is at least ``_AHEAD`` times the largest energy

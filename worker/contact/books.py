@@ -1,4 +1,4 @@
-"""Energies and impulses of contact, summed by node and by part on one rank."""
+"""Energies and impulses of contact on one rank, summed for each node and each part."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from .scene.scene import Scene
 from .solver.impulse_work import book
 
 _SLOTS = 2048
-"""Number of slots in a task; chosen value: a task takes some 20 us, compared with 2 us to start a parallel region."""
+"""Number of slots in a task. Chosen value: a task takes about 20 us, compared with 2 us to start a parallel region."""
 _F1, _F2, _N1 = types.float64[::1], types.float64[:, ::1], types.int32[::1]
 _BOOK = _F1, _F1, _N1, _N1, _F2, types.int64[:, ::1], _F2, types.float64
 _read = reader(*_BOOK)
@@ -48,11 +48,11 @@ class Books:
         self.scale = fixed_point.scale_for(impulse)
         """Number of quanta per N s of an impulse."""
         self.friction = fixed_point.Tally(np.full(2, energy))
-        """Work of friction so far, J; and the part of the work of the last step that the energy ledger does not contain
-        yet."""
+        """Two works of friction, J: the work so far; and the part of the work of the last step that the energy ledger
+        does not contain yet."""
         self.account = Account(energy)
         self.agreed = self.account.words
-        """Sum over all ranks of the words of the account, at the last reduction (account.py)."""
+        """Words of the account, summed over all ranks in the last reduction (account.py)."""
         parts, asked = len(case.parts), any(probe.by is not None for probe in case.probes)
         self.parts = np.zeros((parts, 3), np.int64)
         """(parts, 3) sum of the impulses on each part so far, quanta."""
@@ -62,15 +62,15 @@ class Books:
         self.pressed = np.zeros((nodes.n if "contact_pressure" in case.run.fields else 0, 3), np.int64)
         """(nodes, 3) sum of the impulses since the last frame, quanta; (0, 3) if the field ``contact_pressure`` is not
         requested."""
-        # A copy of a node starts with zero; the parent keeps the energies and impulses.
+        # The energies and impulses of a copy of a node start with zero; the parent keeps its values.
         nodes.columns.declare(self, contact_loss=ZERO, external_work=ZERO, pressed=ZERO)
         self.open: Ints = np.zeros((0, 3), np.int64)
-        """(nodes, 3) impulses of the last step before a restart or a repartition, quanta. After their work was added,
-        the array is (0, 3)."""
+        """(nodes, 3) impulses of the last step before a restart or a repartition, quanta. After the work of these
+        impulses was added, the array has the shape (0, 3)."""
 
     def keep(self, parcel: Parcel, scene: Scene | None) -> None:
-        """Adds all sums to the ``parcel`` (a checkpoint or migration message). The impulses of the last step are read
-        from the ``scene``, if there is a scene.
+        """Adds all sums to the ``parcel`` (a checkpoint or migration message). If there is a scene, the impulses of the
+        last step are read from the ``scene``.
         """
         parcel.nodes["contact.contact_loss"] = self.contact_loss
         parcel.nodes["contact.external_work"] = self.external_work
@@ -97,8 +97,8 @@ class Books:
 
     @staticmethod
     def friction_work(friction: Floats) -> float:
-        """Heat of friction of all ranks at time n, J, without the half of the last step that ``contact_loss`` does not
-        contain yet. ``friction``: sums over all ranks.
+        """Heat of friction of all ranks at time n, J, without the half of the work of the last step that
+        ``contact_loss`` does not contain yet. ``friction``: sums over all ranks.
         """
         work, later = friction
         return float(work - later)
@@ -112,7 +112,7 @@ class Books:
         return np.asarray(comm.sum(self.pairs) / self.scale)
 
     def due(self) -> None:
-        """Sets the outstanding half of the work of friction to zero, because the next call of ``book`` adds this
+        """Sets the outstanding half of the work of friction to zero, because the next call of ``book`` adds that
         half.
         """
         self.friction.words[:, 1] = 0
@@ -123,8 +123,8 @@ class Books:
             self.pressed[scene.own.local] += scene.slots.total[scene.own.slots]
 
     def book(self, scene: Scene, places: Indices) -> None:
-        """Adds half of the work of the last impulses at the ``places`` of the scene, computed with the velocities
-        ``before``; the solver adds the other half.
+        """Adds half of the work of the last impulses at the slots ``places`` of the scene, computed with the velocities
+        ``before``. The solver adds the other half.
         """
         self._book.run(
             len(places), self.contact_loss, self.external_work, places, scene.surface_nodes.local, scene.slots.before,

@@ -1,4 +1,4 @@
-"""Surface, cracks and node normals of a rank, and the updates of these data."""
+"""Surface, cracks and node normals of a rank. The module also updates these data."""
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from .surface import exposure, normals, surface
 from .surface.families import CornerLists, Corners, Families
 
 _WORDS = 9 + 2 * normals.SHARE
-"""Number of columns in a row of ``Exterior.widened``. A row describes a crack that opens."""
+"""Number of columns in a row of ``Exterior.widened``. A row describes a crack that becomes part of the surface."""
 
 
 class Exterior:
@@ -29,14 +29,14 @@ class Exterior:
     def __init__(
         self, model: Model, neighbours: list[Neighbour], bounds: list[Boundary], edges: bool, comm: Comm, team: Team
     ) -> None:
-        """``edges``: whether there is edge-edge contact. Collective."""
+        """``edges``: True if the run has edge-edge contact. Collective."""
         self._normals, self._corner_lists = normals.MeanNormals(team), CornerLists(team)
         self._builder = surface.SurfaceBuilder(team)
         self._model, self._neighbours, self._comm, self._edges = model, neighbours, comm, edges
         self._bounds = bounds
         self.cracks = Cracks.none(model.nodes.id)
         self._near_erosion: Ints | None = None
-        """Ids, ascending, of the local tets that were near erosion at the last search; None if no tet has eroded
+        """Global ids, ascending, of the local tets that were near erosion at the last search; None if no tet has eroded
         yet."""
         self.surface = self._build(np.zeros(model.nodes.n, bool), np.zeros(0, np.int64))
         self.size = typical(self.surface.faces.size, comm)
@@ -44,7 +44,7 @@ class Exterior:
         self.motion = SurfaceMotion(self.surface, model.nodes, mobilities(model.nodes, bounds), self.size, comm)
         self._moments = np.zeros((model.nodes.n, normals.COLUMNS), np.int64)
         self._broken = False
-        """True if facets of any rank have broken; then cracks may open."""
+        """True if facets of any rank have broken, so that cracks may open."""
         columns = model.nodes.columns
         columns.declare(self, _moments=COPIED)
         columns.declare(self, "motion", **SurfaceMotion.COLUMNS)
@@ -66,7 +66,7 @@ class Exterior:
         self.size, self._broken = size, broken
         turned = np.sort(parcel.rows["contact.turned"]["name"])
         self.surface.sharpen(turned)
-        self.surface.turned = turned  # includes edges at cracks; the next search adds these edges to the surface
+        self.surface.turned = turned  # includes edges at cracks, which the next search adds to the surface
         self.surface.flags = np.array(parcel.nodes["contact.flags"])
         self._moments = np.array(parcel.nodes["contact.moments"])
         nodes = self._model.nodes
@@ -94,9 +94,9 @@ class Exterior:
         return self.surface.flags & self._model.nodes.owned
 
     def _build(self, flags: Flags, turned: Ints) -> surface.Surface:
-        """Returns the surface; it includes the sides of cracks that may open, and the faces behind tets near erosion.
-        ``flags`` (n,): nodes that have been on the surface and stay surface nodes; ``turned``: edges that have become
-        sharp and stay sharp. Collective.
+        """Returns the surface. It includes the sides of cracks that may open, and the faces behind tets near erosion.
+        ``flags`` (n,): nodes that have been on the surface and remain surface nodes; ``turned``: edges that have become
+        sharp and remain sharp. Collective.
         """
         model, neighbours, comm = self._model, self._neighbours, self._comm
         sides, covered = self.cracks.foresee(), np.zeros((0, 3), np.int32)
@@ -108,8 +108,8 @@ class Exterior:
         return found
 
     def sharpen(self, scene: Scene, least: Floats) -> None:
-        """Marks edges as sharp if the normals of their two faces have a cosine below ``least`` (parts,). An edge that
-        was sharp once remains sharp.
+        """Marks an edge as sharp if the cosine between the normals of its two faces is below ``least`` (parts,). An
+        edge that was sharp once remains sharp.
         """
         turned = scene.sharpen(least)[: self.surface.edges.n]
         if turned.any():
@@ -118,7 +118,7 @@ class Exterior:
     def uncover(self, gone: Ints, loose: Flags, removed: Flags, scene: Scene | None) -> bool:
         """Updates mean normals, surface nodes and the ``scene`` after erosion. ``gone`` (k, exposure.WORDS): removed
         tets of this rank; ``loose`` (nodes,): nodes without tets that stay in the model; ``removed`` (nodes,): nodes
-        that are removed from the model. Returns whether a search must add faces that are missing in the scene.
+        that are removed from the model. Returns True if a search must add faces that are missing in the scene.
         Collective.
         """
         if self._near_erosion is None:
@@ -145,7 +145,7 @@ class Exterior:
         return False
 
     def _loosen(self, loose: Flags) -> None:
-        """Updates the mobility of nodes that have lost their last tet; such a node is held only by boundaries that act
+        """Updates the mobility of nodes that have lost their last tet. Such a node is held only by boundaries that act
         on the node itself.
         """
         if (loose & ~self.motion.loose).any():
@@ -159,8 +159,8 @@ class Exterior:
             self.surface = self._build(self.surface.flags, self.surface.turned)
 
     def age(self) -> bool:
-        """Admits the edges of all present cracks to edge-edge contact, if the run has edge-edge contact; returns
-        whether a search must add these edges. Collective.
+        """Admits the edges of all present cracks to edge-edge contact, if the run has edge-edge contact. Returns True
+        if a search must add these edges. Collective.
         """
         return self._edges and self.cracks.age(self._comm.sum(self.cracks.ages))
 
@@ -183,8 +183,8 @@ class Exterior:
         return np.asarray(place)
 
     def refresh(self, course: Floats, t: float) -> None:
-        """Sets the positions at time ``t`` and the extrapolated velocities ``course`` (nodes, 3) of the present
-        surface. Collective.
+        """Sets the positions at the simulated time ``t`` and the extrapolated velocities ``course`` (nodes, 3) of the
+        present surface. Collective.
         """
         nodes = self._model.nodes
         self.motion.begin(nodes, course, t)
@@ -194,9 +194,9 @@ class Exterior:
             self.motion.refresh(nodes)
 
     def widened(self, rows: Ints) -> Ints:
-        """(k, _WORDS) messages about the cracks ``rows`` (k,). A message has: whether the last search included the
-        crack; ids of its two sides; ids of the nodes of each side, counter-clockwise seen from outside; contributions
-        of the sides to the moments of the nodes.
+        """(k, _WORDS) messages about the cracks ``rows`` (k,). A message contains: a flag, 1 if the last search
+        included the crack; ids of its two sides; ids of the nodes of each side, counter-clockwise seen from outside;
+        contributions of the sides to the moments of the nodes.
         """
         if not len(rows):
             return np.zeros((0, _WORDS), np.int64)
@@ -224,7 +224,9 @@ class Exterior:
         return bool((received[:, 0] == 0).any())
 
     def narrow(self) -> list[tuple[Block, Corners]]:
-        """Blocks with broken facets, and the corners of the narrow sides of these facets; see corner_contact.py."""
+        """Blocks with broken facets, and the corners of the narrow sides of these facets; see
+        narrow_phase/corner_contact.py.
+        """
         some = enumerate(self._model.blocks) if len(self.cracks.faces) else ()
         return [(block, self.cracks.corners(b, self._corner_lists)) for b, block in some if len(block.bond)]
 
@@ -245,7 +247,7 @@ class Exterior:
 @njit("void(float64[:, ::1], float64[::1], int64[::1], int64)", cache=True)
 def _lighten(mobility, mass, parents, first):  # type: ignore[no-untyped-def]
     """Sets the mobilities of ``parents`` (k,) and of their copies to the inverse of their masses. The copies have
-    numbers from ``first`` on; components that are held stay 0.
+    numbers from ``first`` on. Components that are held remain 0.
     """
     for c in range(len(parents)):
         for i in range(3):

@@ -1,5 +1,5 @@
-"""Geometry of points, faces and edges for kernels. A vector is a tuple of three floats, so that it is kept in registers
-and no array is allocated.
+"""Geometry of points, faces and edges for kernels. A vector is a tuple of three floats. Therefore it is kept in
+registers, and no array is allocated.
 """
 
 import numpy as np
@@ -7,8 +7,8 @@ import numpy as np
 from ..kernels.jit import njit
 
 MARGIN = 1e-3
-"""Tolerance of the area coordinates. If the foot of a node is outside of a face by less than this value, it counts as
-being on the face."""
+"""Tolerance of the area coordinates. If the foot of a node is outside of a face by less than this value, the foot
+counts as being on the face."""
 VECTOR = "UniTuple(float64, 3)"
 """Type of a vector in numba's notation."""
 
@@ -74,8 +74,8 @@ def height(s, i, j, k):  # type: ignore[no-untyped-def]
 
 @njit(f"Tuple((boolean, {VECTOR}))({VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def foot(r, e, f):  # type: ignore[no-untyped-def]
-    """Returns whether the foot of a point is on the face with the edges e and f, and the area coordinates of the foot.
-    ``r``: vector from the common corner of e and f to the point.
+    """Returns two values for a point and the face with the edges e and f: True if the foot of the point is on the face;
+    and the area coordinates of the foot. ``r``: vector from the common corner of e and f to the point.
     """
     ee, ff, ef, er, fr = dot(e, e), dot(f, f), dot(e, f), dot(e, r), dot(f, r)
     area = ee * ff - ef * ef
@@ -99,8 +99,8 @@ def off(s, a, b):  # type: ignore[no-untyped-def]
 
 @njit(f"float64({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def segments(a, b, c, d):  # type: ignore[no-untyped-def]
-    """Distance of the segments ab and cd, m. If the nearest points of their lines are within the segments, it is the
-    distance of these points, else the least distance from an end."""
+    """Distance of the segments ab and cd, m. If the nearest points of the two lines are within the segments, the result
+    is the distance of these points. Else it is the least distance from an end of a segment to the other segment."""
     u, w, r = minus(b, a), minus(d, c), minus(c, a)
     uu, uw, ww, ur, wr = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r)
     area = uu * ww - uw * uw
@@ -113,8 +113,8 @@ def segments(a, b, c, d):  # type: ignore[no-untyped-def]
 
 @njit(f"{VECTOR}({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def nearest(a, b, c, d):  # type: ignore[no-untyped-def]
-    """Vector between the nearest points of two segments: from the point of ab to the point of cd. Ericson (2005),
-    5.1.9.
+    """Vector between the nearest points of two segments, from the point of ab to the point of cd. Source: Ericson
+    (2005), 5.1.9.
     """
     u, w, r = minus(b, a), minus(d, c), minus(c, a)
     uu, uw, ww, ur, wr = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r)
@@ -129,7 +129,7 @@ def nearest(a, b, c, d):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[:, :], int64, int64, int64, int64)", cache=True, error_model="numpy")
 def lowest_height(x, a, b, c, d):  # type: ignore[no-untyped-def]
-    """Least height of the tet abcd, m."""
+    """Smallest height of the tet abcd, m."""
     u, to, fro = minus(at(x, b), at(x, a)), minus(at(x, c), at(x, a)), minus(at(x, d), at(x, a))
     one, two, three, four = cross(u, to), cross(u, fro), cross(to, fro), cross(minus(to, u), minus(fro, u))
     largest = max(max(dot(one, one), dot(two, two)), max(dot(three, three), dot(four, four)))

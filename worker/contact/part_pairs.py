@@ -1,5 +1,5 @@
-"""Properties of pairs of parts: whether contact is allowed, coefficient of friction, and the mass that bounds the
-contact impulses.
+"""Properties of pairs of parts: permission of contact, coefficient of friction, and the mass that bounds the contact
+impulses.
 """
 
 import numpy as np
@@ -13,8 +13,8 @@ from ..rigid.stage import Rigid
 
 
 def friction(case: Case) -> Floats:
-    """(parts, parts) Coulomb's coefficient; it is NaN if the two parts cannot be in contact, for example parts of one
-    body that cannot separate.
+    """(parts, parts) Coulomb's coefficient of friction. The value is NaN if the two parts cannot be in contact, for
+    example parts of one body that cannot separate.
     """
     assert case.contact is not None
     spec, names = case.contact, [part.name for part in case.parts]
@@ -33,21 +33,21 @@ def friction(case: Case) -> Floats:
 
 
 def self_contact(case: Case, mu: Floats) -> Flags:
-    """(parts,) whether each part can be in contact with itself or with another part of its body. ``mu``: result of
-    ``friction``.
+    """(parts,) True for each part that can be in contact with itself or with another part of its body. ``mu``: result
+    of ``friction``.
     """
     body = np.array(bodies(case))
     return np.asarray((~np.isnan(mu) & (body[:, None] == body)).any(axis=1))
 
 
 def lighter(mu: Floats, nodes: Nodes, mobility: Floats, comm: Comm, rigid: Rigid | None = None) -> float:
-    """Returns a mass, kg, that bounds contact impulses: the heaviest node of the lighter of two parts, maximum over all
-    pairs in contact. For ``rigid`` bodies the mass is that of the whole body; the result is 0 if there is no pair.
-    Collective.
+    """Returns a mass, kg, that bounds contact impulses. For a pair of parts it is the mass of the heaviest node of the
+    lighter part; the result is the maximum over all pairs in contact. For ``rigid`` bodies the mass is that of the
+    whole body; the result is 0 if there is no pair. Collective.
 
     No impulse exceeds this mass times a speed, because the lighter part has no more momentum. A part with a held
-    direction (``mobility`` (nodes, 3) is 0) can transmit any impulse, so in this case the other part of the pair
-    counts.
+    direction (``mobility`` (nodes, 3) is 0) can transmit any impulse. In this case the mass of the other part of the
+    pair is used.
     """
     mass, held = np.zeros(len(mu)), np.zeros(len(mu))
     np.maximum.at(mass, nodes.part, nodes.mass)

@@ -1,5 +1,5 @@
-"""Contact in the time step. The stage searches candidate pairs if a search is scheduled, detects active contacts,
-applies impulses and computes the work of the impulses.
+"""Contact in the time step. If a search is scheduled, the stage finds candidate pairs. Then it detects active contacts,
+applies impulses, and computes the work of the impulses.
 
 Every contact is computed by one rank: the owner of its node, or the rank of its first edge. This rank has ghosts of the
 surfaces of other ranks. Impulses on a node are summed over all ranks that have the node or compute a contact of the
@@ -84,15 +84,15 @@ class Contact:
         self._scheme, self.sweep_count = _Scheme.of(case), SweepCount(sweeps(case))
         self.detection = Detection(team, registered, lasting=not (case.fractures or case.erodes))
         self.limit = 0.0
-        """Inverse of the largest step, 1/s, in which no node of any rank passes more than half of a tet with which it
-        is in contact."""
+        """Inverse of a time step, 1/s. It is the largest step in which no node of any rank passes more than half of a
+        tet with which it is in contact."""
         self.last_push = 0.0
-        """Time of the last contact impulse on a node of this rank, s."""
+        """Simulated time of the last contact impulse on a node of this rank, s."""
         self._mean_dt = 0.0
-        """Mean time step at the last step with a scene, s; the kick of this step took this time."""
+        """Mean time step at the last step with a scene, s. The kick of that step used this time."""
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the state of contact to the ``parcel`` of a checkpoint or migration message; candidate pairs are not
+        """Adds the state of contact to the ``parcel`` of a checkpoint or migration message. The candidate pairs are not
         added, because a search finds them again."""
         books = self.books
         parcel.known["contact"] = (
@@ -159,7 +159,7 @@ class Contact:
         return self.books.account.words.reshape(-1)
 
     def agree(self, all_ranks: StepReduction) -> None:
-        """Reads the results of the reduction of the step. Collective."""
+        """Reads the results of the reduction of the step that concern contact. Collective."""
         self.sweep_count.agree(all_ranks.unsettled)
         self.books.agreed = all_ranks.costs.reshape(2, 2)
         self.searches.due |= all_ranks.search
@@ -170,22 +170,22 @@ class Contact:
 
     @property
     def found(self) -> Detected:
-        """Result of the last detection on this rank."""
+        """Result of the last detection of active contacts on this rank."""
         return self.detection.found
 
     @property
     def approach(self) -> float:
-        """Inverse of the largest step, 1/s, in which no node in contact on this rank passes more than half of a tet."""
+        """Inverse of the largest time step, 1/s, in which no contact node of this rank passes more than half a tet."""
         return self.found.approach
 
     @property
     def stray(self) -> bool:
-        """True if a slot will depart too far from its reference motion, so that it must be registered again."""
+        """True if a slot will soon depart too far from its reference motion, so that it must be registered again."""
         return self.found.stray
 
     @property
     def opening(self) -> bool:
-        """True if a crack is wide enough to open after the last step."""
+        """True if a crack is wide enough, after the last step, to become part of the surface."""
         return len(self.found.opening) > 0
 
     def open_cracks(self) -> None:
@@ -196,7 +196,7 @@ class Contact:
             self.searches.due |= self.exterior.open(received, self.searches.scene)
 
     def separate(self, split: Split) -> None:
-        """Updates contact after the separation of nodes. All ranks must call the method; see topology_updates.py."""
+        """Updates contact after the separation of nodes (topology_updates.py). All ranks must call the method."""
         self.searches.separate(split, self.exterior.separate(split))
 
     def grow(self, split: Split, ids: Ints) -> None:
@@ -229,8 +229,8 @@ class Contact:
         return self.searches.spent(state)
 
     def look_ahead(self, state: Nodes) -> bool:
-        """Bounds the first step by the pairs that approach each other. Returns whether there are any such pairs.
-        Collective.
+        """Limits the first step because of the pairs that approach each other. Returns True if there are any such
+        pairs. Collective.
         """
         if (now := self.searches.scene) is None:
             return False
@@ -271,9 +271,9 @@ class Contact:
         shared.free()
 
     def _resume(self, give: float) -> float:
-        """Ratio of this step to the last step, which is the factor of the stored impulses. Without restitution the
-        factor is 0 while contact has no energy to return (``give`` = 0), because a stored impulse that is too large
-        adds energy.
+        """Length of this step divided by the length of the last step; the stored impulses are multiplied by this
+        factor. Without restitution the factor is 0 while contact has no energy to return (``give`` = 0), because a
+        stored impulse that is too large adds energy.
         """
         mean_dt = self._clock.mean_dt
         ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0
@@ -281,7 +281,7 @@ class Contact:
         return ratio if give > 0.0 or self._scheme.restitution > 0.0 else 0.0
 
     def _meet(self, now: Scene, give: float, dt: float) -> None:
-        """Detects the active contacts of the step. ``give``: fraction of a penetration that is corrected
+        """Detects the active contacts of the step. ``give``: fraction of a penetration that is corrected in the step
         (tables.PUSH_OUT)."""
         step = self._clock.step
         if step % _FORESIGHT == 0:

@@ -1,3 +1,3 @@
-"""Fracture: facets between tets break, nodes separate, cohesive tractions act between crack surfaces, fragments are
-counted.
+"""Fracture of parts: facets between tets break, nodes separate, cohesive tractions act between crack surfaces, and
+fragments are counted.
 """

@@ -21,8 +21,8 @@ class Breaking:
 
     @property
     def rows(self) -> Ints:
-        """(m, 2) place of the tet and local face of each facet, which are the indices into the facet table of the
-        body.
+        """(m, 2) indices of each facet into the facet table of the body: place of its tet, and local face of the
+        tet.
         """
         one, two = self.facets.sides[:, 0, 1:], self.facets.sides[:, 1, 1:]
         return np.where(one[:, :1] >= 0, one, two).astype(np.int64)
@@ -51,7 +51,7 @@ def _mass(mesh, e):  # type: ignore[no-untyped-def]
 
 @njit(types.void(BREAKING, types.int64, types.int64, CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
 def _fill(out, m, i, found, shared, mesh, block):  # type: ignore[no-untyped-def]
-    """Fills row ``m`` of ``out`` with the data of the candidate facet ``i``."""
+    """Writes the data of the candidate facet ``i`` to row ``m`` of ``out``."""
     place, face, row = found.place[i], found.face[i], found.shared[i]
     behind, mass = mesh.across[place, face], _mass(mesh, place)
     first = row < 0 or shared.first[row]
@@ -75,8 +75,8 @@ def _fill(out, m, i, found, shared, mesh, block):  # type: ignore[no-untyped-def
 
 @njit(BREAKING(CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
 def _gather(found, shared, mesh, block):  # type: ignore[no-untyped-def]
-    """Fills the table for ``gathered``; ``block``: index of the block of tets of the body. A facet between two blocks
-    of this rank is collected once, with the block of its first side.
+    """Fills the table with the facets of ``gathered``. ``block``: index of the block of tets of the body. A facet
+    between two blocks of this rank is collected once, with the block of its first side.
     """
     n = len(found.place)
     out = BreakingFacets(

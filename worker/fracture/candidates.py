@@ -17,18 +17,18 @@ class CandidateSearch:
     """
 
     def __init__(self, bodies: int, interface: Interface, team: Team) -> None:
-        """``bodies``: number of bodies; ``interface``: facets shared with other ranks and blocks."""
+        """``bodies``: number of bodies; ``interface``: the facets that are shared with other ranks and blocks."""
         self.interface = interface
         self._count = Pass(team, tasks.count, *tasks.COUNT, size=tasks.TETS_OF_A_TASK)
         self._search = Pass(team, tasks.search, *tasks.SEARCH, size=tasks.TETS_OF_A_TASK)
         self._scratch = Scratch()
         self._rooms = [Candidates.of(0) for _ in range(bodies)]
-        """Arrays for the candidates of each body. The content is valid until the next search in the same body."""
+        """Arrays for the candidate facets of each body. The next search in the same body overwrites them."""
 
     def find(self, k: int, body: Body, x: Floats, step: int, t: float) -> Candidates:
-        """Returns the candidate facets of the ``body`` with number ``k`` that break in step number ``step`` at time
-        ``t``, s, because their clock has run long enough. If ``step`` is 0, returns all candidates. ``x`` (nodes, 3):
-        positions, m.
+        """Returns the candidate facets of body number ``k`` that break in step number ``step`` at time ``t``, s. A
+        facet breaks if the clock of its delayed criterion has run long enough. If ``step`` is 0, the function returns
+        all candidate facets. ``x`` (nodes, 3): positions, m.
         """
         rows, mesh, table, law, hot = self.interface.of_body[k], body.mesh, body.facets, body.law, body.hot
         many = self._count.many(len(hot))

@@ -17,19 +17,19 @@ r"""Cohesive facets with an irreversible law: the traction decreases linearly wi
                     .        +-> e.         sides, e a unit vector along its first edge:
      first side    0-------------1              d_n = n . d,   d_t = (e . d, (n x e) . d)
 
-With e = 0 this is the usual cohesive law. The stiffness of the usual law is unbounded just after insertion: rounding
-would determine the direction of the traction, and unloading would require a time step of zero. The offset e reproduces
-the traction at insertion in size and direction. The offset leaves the area under the curve unchanged and bounds the
-stiffness by strength / e. The size of e is the smallest size that leaves the stable time step unchanged. With three
-pairs of nodes every mode of opening has a stiffness. Under pressure only d_t counts, because contact prevents
-penetration.
+With the offset e = 0 the law is the usual cohesive law. The stiffness of the usual law is unbounded just after
+insertion: rounding would determine the direction of the traction, and unloading would require a time step of zero. The
+offset e reproduces the traction at insertion in size and direction. The offset leaves the area under the curve
+unchanged and bounds the stiffness by strength / e. The size of e is the smallest size that leaves the stable time step
+unchanged. With three pairs of nodes every mode of opening has a stiffness. If the facet is under pressure, only the
+tangential opening d_t counts, because contact prevents penetration.
 
 At insertion a cohesive facet is under tension: it stores the energy strength e / 2 per area, although no work was done
-on it. While D >= e (column ``lent``), a pair of nodes has absorbed at least as much energy as it would release by
-closing. A pair that would close further is unloaded, partly or completely: its offset is shortened, so that it obeys
-the law again from its present position. The unloading does not change the stiffness of the pair. Strength and critical
-opening are set so that the area under the remaining law is the remaining energy (formulas: law.py; time of unloading:
-unloading.py).
+on it. While its effective opening D is at least the offset e (column ``lent``), a pair of nodes has absorbed at least
+as much energy as it would release by closing. A pair that would close further is unloaded, partly or completely: its
+offset is shortened, so that it obeys the law again from its present position. The unloading does not change the
+stiffness of the pair. Strength and critical opening are set so that the area under the remaining law is the remaining
+energy (formulas: law.py; time of unloading: unloading.py).
 
 A facet whose nodes have not separated has no opening: the two nodes of a pair are the same node, so the tractions on
 this node cancel.
@@ -52,7 +52,7 @@ class Cohesion:
     """Cohesive facets of one rank; updates their openings and tractions, and sums the work done on them."""
 
     def __init__(self, energy: float, threads: Team) -> None:
-        """``energy``: order of magnitude of the work on a facet, J, from which the quantum of the sums is chosen;
+        """``energy``: order of magnitude of the work on a facet, J; the quantum of the energy sums is chosen from it.
         ``threads``: number of threads of the rank.
         """
         self.facets = Facets.none()
@@ -68,8 +68,8 @@ class Cohesion:
         self.facets = self.facets.and_more(new)
 
     def close(self, gone: Ints) -> None:
-        """Ends the facets of the tets ``gone`` (k,), ids, ascending: their present traction acts until the next
-        ``open``, which books its work and removes them.
+        """Ends the facets of the tets ``gone`` (k,), ids, ascending. The present traction of these facets acts until
+        the next call of ``open``, which adds its work to the sums and removes the facets.
         """
         of, law = among(gone, self.facets.tets).any(axis=1), self.facets.softening
         law.strength[of] = law.critical[of] = law.knee[of] = 0.0
@@ -84,7 +84,7 @@ class Cohesion:
         return moved
 
     def open(self, x: Floats) -> None:
-        """Computes openings, tractions and work at the positions ``x`` (nodes, 3); removes the facets that have
+        """Computes openings, tractions and work at the positions ``x`` (nodes, 3), m; removes the facets that have
         failed.
         """
         f, tiny = self.facets, np.finfo(float).tiny
@@ -106,8 +106,8 @@ class Cohesion:
         self._unload.run(len(self.facets.tets), *self.facets, change.reshape(-1), *of, steps, nodes.scale, whole)
 
     def foresee(self, nodes: Nodes, mean_dt: float) -> None:
-        """Stores the opening velocities that the pairs would have in the next step if only the present nodal forces
-        acted.
+        """Stores the opening velocities that the pairs of nodes would have in the next step if only the present nodal
+        forces acted.
         """
         of = nodes.v, nodes.force, nodes.mass
         self._foresee.run(len(self.facets.tets), *self.facets, *of, mean_dt / nodes.scale)
@@ -145,7 +145,8 @@ class Cohesion:
     @staticmethod
     def energies(sums: Floats, gone: Floats) -> tuple[float, float, float]:
         """Returns three energies of all facets inserted so far, J: dissipated energy, energy recoverable by closing,
-        and fracture energy. ``sums`` and ``gone`` are sums over all ranks.
+        and fracture energy. ``sums``: energies of the present facets; ``gone``: energies of the failed facets. Both are
+        sums over all ranks.
         """
         work, reversible, whole = sums
         gone_work, gone_whole = gone
@@ -158,7 +159,7 @@ def _whole(facets: Facets) -> Floats:
 
 
 def sizes(offset: Floats, shear: Floats) -> Floats:
-    """(m,) effective openings D that belong to offsets (m, 3), m."""
+    """(m,) effective openings D, m, of facets with the offsets (m, 3), m."""
     return np.asarray(np.sqrt(offset[:, 0] ** 2 + shear * (offset[:, 1] ** 2 + offset[:, 2] ** 2)))
 
 

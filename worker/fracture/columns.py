@@ -12,7 +12,7 @@ from ..model.state import Flags, Floats, Indices, Ints, extended
 
 
 class FacetConstants(NamedTuple):
-    """Values of a facet that are constant after its insertion, in SI units."""
+    """Columns of a facet that are constant after its insertion, in SI units."""
 
     energy: Floats
     """(m,) fracture energy per area, J/m^2."""
@@ -32,11 +32,11 @@ class Softening(NamedTuple):
     knee: Floats
     """(m, 3) size D of the opening at which softening begins, m."""
     lent: Floats
-    """(m, 3) effective opening D at insertion, e, m; a pair that closes below this value would release more energy than
-    it absorbed. Unloading of the pair decreases the value, possibly to 0."""
+    """(m, 3) effective opening D at insertion, e, m; a pair whose effective opening becomes smaller than e would
+    release more energy than it absorbed. Unloading of the pair decreases e, possibly to 0."""
     offset: Floats
-    """(m, 3, 3) offset of the opening, m, in three components: along the normal, along the first edge, and across both
-    directions."""
+    """(m, 3, 3) offset of the opening, m; its components are along the normal, along the first edge, and perpendicular
+    to both."""
 
 
 class PairState(NamedTuple):
@@ -71,7 +71,7 @@ class Facets(NamedTuple):
 
     @classmethod
     def of(cls, columns: Mapping[str, Any]) -> "Facets":
-        """Builds the records from all columns, keyed by name."""
+        """Builds the records from a dictionary of all columns; the keys are the names of the columns."""
         constants = FacetConstants(*(columns[name] for name in FacetConstants._fields))
         softening = Softening(*(columns[name] for name in Softening._fields))
         state = PairState(*(columns[name] for name in PairState._fields))
@@ -87,17 +87,17 @@ class Facets(NamedTuple):
         )  # fmt: skip
 
     def columns(self) -> dict[str, Any]:
-        """Returns all columns, keyed by name."""
+        """Returns all columns as a dictionary; the keys are the names of the columns."""
         records = (self.constants, self.softening, self.state)
         columns = {name: column for each in records for name, column in each._asdict().items()}
         return {"tets": self.tets, "nodes": self.nodes, **columns}
 
     def take(self, chosen: Flags) -> "Facets":
-        """Returns the chosen facets."""
+        """Returns the facets for which ``chosen`` (m,) is True."""
         return Facets.of({name: column[chosen] for name, column in self.columns().items()})
 
     def and_more(self, new: "Facets") -> "Facets":
-        """Returns a table of these facets, followed by the ``new`` facets."""
+        """Returns a table of the present facets, followed by the ``new`` facets."""
         rows = new.columns()
         return Facets.of({name: extended(column, rows[name]) for name, column in self.columns().items()})
 

@@ -16,13 +16,13 @@ from ..parallel.passes import Pass
 from ..parallel.team import TASK, Team, team
 
 _PART = 1 << 62
-"""Offset above all tet ids. The graph has one more node for each part without facets, which connects all tets of the
-part; the number of this node is the offset plus the number of the part."""
+"""Offset that is larger than all tet ids. For each part without facets the graph has one more node, which connects all
+tets of the part. The number of this node is the offset plus the number of the part."""
 _TETS = 4096
-"""Number of tets in a task; chosen value: in a bar of 55,000 tets, 7 % of the facets are between tets of two tasks; a
-single thread joins the tets at these facets."""
+"""Number of tets in a task. Chosen value: in a bar of 55,000 tets, 7 % of the facets are between tets of two different
+tasks, and a single thread joins the tets at these facets."""
 _NOWHERE, _ELSEWHERE = -1, -2
-"""Values for the place of a tet: no tet, and a tet on another rank."""
+"""Values that replace the place of a neighbour tet: no tet, and a tet on another rank."""
 _I, _I1, _N1, _N2 = types.int64, types.int64[::1], types.int32[::1], types.int32[:, ::1]
 _BIND = _N1, _I1, _N1, _I1, _N2, _N2, types.uint8[:, ::1], _I
 _NAME = _I1, _N1, _I1
@@ -30,8 +30,8 @@ _read_bind, _read_name = reader(*_BIND), reader(*_NAME)
 
 
 class Connectivity:
-    """Connectivity of the tets of one rank, computed by the threads. The places of the neighbour tets are stored until
-    the tets of the rank change.
+    """Connectivity of the tets of one rank, computed by the threads. The object stores the places of the neighbour tets
+    until the tets of the rank change.
     """
 
     def __init__(self, model: Model, comm: Comm, threads: Team) -> None:
@@ -44,8 +44,8 @@ class Connectivity:
         """Returns the label of the fragment of each tet, (n,) for each block of tets. A label is the smallest global id
         of the tets of the fragment. Collective.
 
-        Two tets are connected if the facet between them is intact, or if they are a pair of ``held``: (m, 2) global ids
-        of the tets of cohesive facets. A rank gives a pair if it has at least one of the two tets. A block of tets
+        Two tets are connected if the facet between them is intact, or if a cohesive facet connects them. ``held`` (m,
+        2): global ids of the two tets of each cohesive facet that has at least one tet on this rank. A block of tets
         without the array ``across`` is a single piece.
         """
         blocks = self._model.blocks
@@ -71,8 +71,8 @@ class Connectivity:
         self._beside = [_beside(self._where, block) for block in blocks]
 
     def _bind_block(self, root: Indices, block: Block, beside: Indices, first: int) -> Ints:
-        """Joins the tets of a block through their intact faces; the places of the tets begin at ``first``. Returns the
-        pairs across ranks, (k, 2), see ``_bind_held``.
+        """Joins the tets of a block through their intact faces. ``first``: number of the first tet of the block among
+        the tets of the rank. Returns the pairs across ranks, (k, 2), see ``_bind_held``.
         """
         if not block.n:
             return np.zeros((0, 2), np.int64)
@@ -102,8 +102,8 @@ def _beside(where: IdIndex, block: Block) -> Indices:
 
 
 def count(model: Model, labels: list[Ints], comm: Comm) -> int:
-    """Returns the number of fragments; the number is counted by the tets whose id is the label of their fragment: each
-    fragment has exactly one. Collective.
+    """Returns the number of fragments of all ranks. Each fragment has exactly one tet whose id is the label of the
+    fragment; these tets are counted. Collective.
     """
     named = sum(int((block.id == of).sum()) for block, of in zip(model.blocks, labels, strict=True))
     return int(comm.sum(np.array([named]))[0])
@@ -120,8 +120,8 @@ def components(n: int, edges: Ints | Indices) -> Ints:
 
 
 def _bind_held(root: Indices, ids: Ints, where: IdIndex, pairs: Ints) -> Ints:
-    """Joins pairs of tets (m, 2). Returns the pairs across ranks, (k, 2): id of the tet on this rank, id of the other
-    tet.
+    """Joins the tets of each pair in ``pairs`` (m, 2). Returns the pairs across ranks, (k, 2): id of the tet on this
+    rank, id of the other tet.
     """
     if not len(pairs):
         return np.zeros((0, 2), np.int64)
@@ -217,7 +217,7 @@ def _bind_outer(root, ids, outer, counts, beside, begin):  # type: ignore[no-unt
 
 @njit(TASK, cache=True)
 def _name_range(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: sets the ``names`` of tets to the ids of the roots of their trees."""
+    """Task: sets the ``names`` of tets to the global ids of the roots of their trees."""
     names, root, ids = _read_name(table)
     for a in range(first, stop):
         b = root[a]

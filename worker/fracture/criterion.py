@@ -1,9 +1,10 @@
 """Fracture criterion: compares the traction on a facet, the mean of the tractions of its two tets, with the strength of
 the facet.
 
-Under tension a facet breaks where sqrt(<t_n>^2 + w t_s^2) reaches the strength; the Macaulay bracket <> is missing in
-eq. (1) of the paper. Under pressure a facet breaks where sqrt(w) <t_s - mu |t_n|> reaches the strength (Camacho and
-Ortiz 1996). ::
+Under tension a facet with the normal traction t_n and the shear traction t_s breaks where sqrt(<t_n>^2 + w t_s^2)
+reaches the strength; w is the weight of shear. The Macaulay bracket <> is missing in eq. (1) of the paper. Under
+pressure a facet breaks where sqrt(w) <t_s - mu |t_n|> reaches the strength (Camacho and Ortiz 1996); mu is the
+coefficient of internal friction. ::
 
                   n                              t = (stress_1 + stress_2) / 2 n
           tet 2   ^    t                         t_n = t . n, positive in tension
@@ -11,9 +12,9 @@ Ortiz 1996). ::
           tet 1   | /                            n: outward normal of the tet of smaller id, tet 1
 
 The formula for tension is convex and is an upper bound of the formula for pressure. Therefore the mean of two tractions
-reaches the strength only if one of the two tractions reaches it. The pass over the elements marks the overstressed
-faces of each tet (elements/hot.py), and the mean traction is computed only for facets with a marked face. A facet whose
-mean traction reaches the strength is a candidate.
+can reach the strength only if at least one of the two tractions reaches it. The pass over the elements marks the
+overstressed faces of each tet (elements/hot.py), and the mean traction is computed only for facets with a marked face.
+A facet whose mean traction reaches the strength is a candidate.
 """
 
 import numpy as np
@@ -97,8 +98,8 @@ def effective(t, normal, weight, friction):  # type: ignore[no-untyped-def]
 @njit(types.int64(CANDIDATES, types.int64, types.int64, types.int64, types.uint8[::1], MESH), cache=True)
 def _of_tet(out, n, end, e, hot, mesh):  # type: ignore[no-untyped-def]
     """Writes the overstressed facets of tet ``e`` to the rows of ``out`` from ``n`` on, but not to ``end`` or beyond. A
-    facet with two overstressed sides is written once, from its first side. Returns the next row, which may be beyond
-    ``end``.
+    facet with two overstressed sides is written once, from its first side. Returns the number of the next row; the
+    number may be larger than ``end``.
     """
     for k in range(4):
         if not (hot[e] & mesh.intact[e]) >> k & 1:
@@ -118,7 +119,7 @@ def overstressed(out, begin, end, hot, mesh, first, stop):  # type: ignore[no-un
     """Writes the overstressed facets between tets of this rank, for the tets from ``first`` to ``stop``, to the rows of
     ``out`` from ``begin`` to ``end``; returns the number of these facets, even if it is larger than the number of rows.
 
-    ``hot`` (tets,): bit k is set if face k is overstressed. The values of eight tets are read at once.
+    ``hot`` (tets,): bit k is set if face k is overstressed. The loop reads the values of eight tets at once.
     """
     n, words = begin, (stop - first) // 8
     one, two = hot[first : first + 8 * words].view(np.uint64), mesh.intact[first : first + 8 * words].view(np.uint64)
@@ -132,8 +133,9 @@ def overstressed(out, begin, end, hot, mesh, first, stop):  # type: ignore[no-un
 
 @njit(types.int64(CANDIDATES, MESH, TABLE, POINTS, LAW, types.int64, types.int64), cache=True)
 def within(out, mesh, table, x, law, first, stop):  # type: ignore[no-untyped-def]
-    """Moves the candidates among the facets of ``out`` from ``first`` to ``stop`` to the front of this range; returns
-    their number. The stresses of several facets are read in one loop, so that the waiting times for memory overlap.
+    """Tests the facets in the rows ``first`` to ``stop`` of ``out``, and moves the candidates to the front of this
+    range; returns the number of candidates. One loop reads the stresses of several facets, so that the waiting times
+    for memory overlap.
     """
     normal, one, two, m = np.empty(3), np.empty(3), np.empty(3), first
     near, far = np.empty((_TOGETHER, 6)), np.empty((_TOGETHER, 6))
@@ -162,7 +164,7 @@ def within(out, mesh, table, x, law, first, stop):  # type: ignore[no-untyped-de
 
 @njit("void(int64[::1], int64[::1], int64[::1], float64[:, ::1], int64, int64)", cache=True)
 def _copy(place, face, shared, traction, m, i):  # type: ignore[no-untyped-def]
-    """Copies row ``i`` of candidates to row ``m``."""
+    """Copies row ``i`` of the candidates to row ``m``."""
     place[m], face[m], shared[m] = place[i], face[i], shared[i]
     for k in range(4):
         traction[m, k] = traction[i, k]
@@ -183,8 +185,8 @@ def _joined(out, begins, counts):  # type: ignore[no-untyped-def]
 
 @njit(types.void(INTERFACE, _I1, MESH, types.uint8[::1]), cache=True)
 def mark_shared(shared, chosen, mesh, hot):  # type: ignore[no-untyped-def]
-    """Marks each neighbour rank with which this rank shares a facet that is among the ``chosen`` rows, intact, and
-    overstressed on this side. The chosen facets are of one body. ``hot`` (tets,): marks of overstressed faces, as in
+    """Marks each neighbour rank with which this rank shares a facet that is in a ``chosen`` row, is intact, and is
+    overstressed on this side. The chosen facets belong to one body. ``hot`` (tets,): marks of overstressed faces, as in
     ``search``.
     """
     for m in chosen:
@@ -195,8 +197,8 @@ def mark_shared(shared, chosen, mesh, hot):  # type: ignore[no-untyped-def]
 
 @njit(types.void(INTERFACE, _I1, MESH, POINTS), cache=True)
 def own_tractions(shared, chosen, mesh, x):  # type: ignore[no-untyped-def]
-    """Computes the tractions of this rank's tets on the intact ``chosen`` shared facets of one body. Only facets shared
-    with ranks with which an overstressed facet is shared are computed.
+    """Computes the tractions of this rank's tets on the intact ``chosen`` shared facets of one body. Facets shared with
+    a neighbour rank are skipped if no facet shared with this rank is overstressed.
     """
     normal, stress = np.empty(3), np.empty(6)
     for m in chosen:
@@ -243,7 +245,8 @@ def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
     returns the number of these facets.
 
     If the clock of an overstressed facet ran in the last step, number ``step`` - 1, the clock continues; else it starts
-    at the time ``t``. With nodal tractions a candidate may be not overstressed; such a candidate has no clock.
+    at the time ``t``. If the part uses nodal tractions, a candidate need not be overstressed; such a candidate has no
+    clock.
     """
     m = 0
     for i in range(n):

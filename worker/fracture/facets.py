@@ -20,12 +20,12 @@ from .strength import Toughness
 _BATCH = 10_000
 """Number of tets that are initialised in one call; the number limits the temporary memory."""
 ELSEWHERE = -2
-"""Value for the place of a tet that is on another rank; the value -1 means that there is no tet."""
+"""Value that replaces the place of a tet that is on another rank. (The value -1 means that there is no tet.)"""
 
 
 @dataclass
 class Body:
-    """The facets of a block of tets that break by one law; these are either all facets between tets of the block, or
+    """The facets of a block of tets that break by one law. These are either all facets between tets of the block, or
     all facets between the block and another part that a bond joins.
     """
 
@@ -38,18 +38,23 @@ class Body:
     """Range of the global ids of the tets on the other side of the facets: first id, and last id plus 1."""
     mesh: Mesh
     facets: FacetTable
-    """The tets of the block; all bodies of the block share this record and the record ``facets``."""
+    """The tets of the block. The record is shared by all bodies of the block; the same is true for the record
+    ``facets``."""
     law: Law
     own: bool = True
     """True if the two tets of each facet are in the same part."""
 
     def has(self, across: Indices) -> Flags:
-        """Returns whether each face is a facet of the body; ``across``: neighbours of the faces."""
+        """Returns a flag for each face: True if the face is a facet of this body. ``across``: neighbour tets of the
+        faces.
+        """
         return np.asarray((across >= 4 * self.behind[0]) & (across < 4 * self.behind[1]))
 
     @property
     def hot(self) -> Bits:
-        """(n,) marks of overstressed faces, see Block.hot. The array is empty if the facets are between two parts."""
+        """(n,) marks of overstressed faces, see Block.hot. The array is empty if the facets of the body are between two
+        parts.
+        """
         return self.block.hot if self.own else self.block.hot[:0]
 
     def set_strengths(self, places: Ints, x0: Floats) -> None:
@@ -62,8 +67,9 @@ class Body:
         self.facets.strength[place, face] = self.tough.strengths(facet_ids(self.block, place, face), area)
 
     def follow(self, split: Split, x0: Floats) -> None:
-        """Recomputes strengths that depend on areas, at tets whose nodes separated. The order of the nodes changes the
-        last bit of an area, and a run that resumes from a checkpoint has the present order of the nodes only.
+        """Computes the strengths that depend on areas again, for facets at the tets whose nodes separated. The order of
+        the nodes of a face changes the last bit of its area. A run that resumes from a checkpoint has only the present
+        order of the nodes.
         """
         scatter = self.tough.scatter
         if scatter is not None and scatter.area is not None:
@@ -71,7 +77,8 @@ class Body:
 
 
 Terms = tuple[Spec, Toughness, tuple[int, int]]
-"""Fracture specification, constants, and the range of the global ids of the tets on the other side of the facets."""
+"""Fracture specification of a body, its constants, and the range of the global ids of the tets on the other side of its
+facets."""
 
 
 def bodies_of(index: int, block: Block, own: Terms, bonds: list[Terms], x0: Floats) -> list[Body]:
@@ -104,8 +111,8 @@ def shear_weight(spec: Spec) -> float:
 
 
 def mesh_of(block: Block, beside: Indices | None = None) -> Mesh:
-    """Returns the record of a block of tets that the kernels read. ``beside``: column of Mesh; if it is None, the tets
-    behind the faces are found by their ids.
+    """Returns the record of a block of tets that the kernels read. ``beside``: column of Mesh; if ``beside`` is None,
+    the function finds the tets behind the faces by their ids.
     """
     beside, state = _beside(block) if beside is None else beside, block.state.reshape(-1)
     intact = np.packbits((block.bond == INTACT) & (beside >= 0), axis=1, bitorder="little")[:, 0].copy()
@@ -113,7 +120,7 @@ def mesh_of(block: Block, beside: Indices | None = None) -> Mesh:
 
 
 def without(mesh: Mesh, block: Block, moves: Moves) -> Mesh:
-    """Returns the record of a block from which tets were removed, from its record before."""
+    """Returns the record of a block after the removal of tets; the input is the record before the removal."""
     beside = moves.applied(mesh.beside)
     return mesh_of(block, np.where(beside >= 0, moves.places[beside], beside))
 
@@ -134,8 +141,8 @@ def facet_ids(block: Block, places: "np.ndarray", faces: "np.ndarray") -> Ints:
 
 
 def clocks(body: Body, step: int) -> Table:
-    """Returns the clocks that ran in step number ``step``: one row for each tet at the facet on this rank, with the id
-    of the facet.
+    """Returns a table of the clocks that ran in step number ``step``. The table has one row for each tet on this rank
+    at a facet; the row contains the id of the facet.
     """
     place, face = np.nonzero(body.facets.seen == step)
     since, key, block = body.facets.since[place, face], facet_ids(body.block, place, face), body.block
@@ -147,7 +154,7 @@ def clocks(body: Body, step: int) -> Table:
 
 
 def set_clocks(body: Body, table: Table, step: int) -> None:
-    """Restores the clocks of step number ``step``; ``table`` has the clocks of all bodies."""
+    """Sets the clocks of step number ``step`` from ``table``, which has the clocks of all bodies."""
     index = IdIndex(body.block.id)
     mine = index.places(table["tet"]) >= 0
     facet, tet = table["key"][mine], table["tet"][mine]

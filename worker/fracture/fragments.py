@@ -1,13 +1,13 @@
-"""Fragments: tets connected through intact and cohesive facets. The module computes their mass, motion, energy and new
-surface.
+"""Fragments: tets connected through intact and cohesive facets. The module computes mass, motion, energy and new
+surface of each fragment.
 
 The label of a fragment is the smallest global id of its tets. Each rank finds its own connected pieces. Then every rank
 solves the small graph of the pieces that are connected across ranks (connectivity.py).
 
 A tet gives a quarter of its mass to each of its nodes, at the position and with the velocity of the node. Therefore
 mass, momentum, angular momentum and energy, summed over all fragments, are equal to the sums over the nodes. The
-inertia is that of the lumped masses, which is larger than the inertia of the solid; for a single tet it is five times
-as large. Nodes without tets belong to no fragment.
+inertia is that of the lumped masses, which is larger than the inertia of the solid; for a single tet the lumped inertia
+is five times as large. Nodes without tets belong to no fragment.
 
 The values of the tets of a fragment are summed as integers. The quantum of each fragment is 2^-60 of its largest term,
 so the sums do not depend on order and ranks, and a small fragment keeps its digits beside a large one. Centre and
@@ -32,12 +32,12 @@ from ..model.state import Block, Floats, Ints, Model
 from ..parallel.comm import Comm
 
 _NODE_BITS = 40
-"""Number of bits of a global node id."""
+"""Number of bits that store a global node id."""
 _LIMB = 2.0**30
-"""Number of quanta in a limb of an exact sum, see parallel/fixed_point.py."""
+"""Number of quanta in one limb of an exact sum, see parallel/fixed_point.py."""
 _FLAT = 1e-10
-"""Smallest ratio of a principal moment of inertia to the largest one; below this ratio the axis counts as without
-inertia."""
+"""Smallest ratio of a principal moment of inertia to the largest one. An axis with a smaller ratio is treated as an
+axis without inertia."""
 
 FRAGMENT = np.dtype([
     ("label", np.int64), ("part", np.int64), ("tets", np.int64), ("nodes", np.int64), ("mass", float),
@@ -49,8 +49,8 @@ FRAGMENT = np.dtype([
 
 
 class Groups:
-    """Fragments of the tets of one rank, and sums over each fragment. The sums do not depend on the order of the terms;
-    all methods are collective.
+    """Fragments of the tets of one rank, and sums over each fragment. The sums do not depend on the order of their
+    terms. All methods are collective.
     """
 
     def __init__(self, labels: Ints, comm: Comm) -> None:
@@ -81,8 +81,8 @@ class Groups:
         return self.complete(np.add.reduceat(words[self._order], self._starts, axis=0))
 
     def complete(self, found: Ints, elsewhere: Ints | None = None) -> Ints:
-        """Adds up ``found`` (g, k) over the ranks. ``elsewhere`` (s, k) is added to the fragments that are on several
-        ranks.
+        """Adds the sums ``found`` (g, k) of all ranks, for the fragments with tets on several ranks. ``elsewhere`` (s,
+        k): terms that are added to the sums of these fragments.
         """
         if len(self.split):
             parts = np.zeros((len(self.split), found.shape[1]), np.int64) if elsewhere is None else elsewhere
@@ -114,7 +114,7 @@ def table(model: Model, labels: list[Ints], comm: Comm) -> "np.ndarray | None":
     rows = np.zeros(len(groups.label), FRAGMENT)
     rows["label"] = groups.label
     part = np.concatenate([np.zeros(0), *(np.full(block.n, float(block.part)) for block in blocks)])
-    rows["part"] = -groups.largest(-part[:, None])[:, 0]  # the first of the parts that share the node
+    rows["part"] = -groups.largest(-part[:, None])[:, 0]  # the first part among the parts that share the node
     rows["tets"] = groups.count(np.ones((len(tets), 1), np.int64))[:, 0]
     rows["nodes"] = _node_counts(model, tets, groups, comm)
     _move(rows, groups, tets, mass, nodes.x, nodes.v)
@@ -150,10 +150,11 @@ def _move(rows: "np.ndarray", groups: Groups, tets: Ints, mass: Floats, x: Float
 
 
 def _about(r: Floats, w: Floats) -> Floats:
-    """(n, 10) angular momentum, inertia and kinetic energy per mass of points at ``r``, m, with velocity ``w``, m/s.
+    """(n, 10) angular momentum, inertia and kinetic energy, each per mass, of points at ``r``, m, with velocity ``w``,
+    m/s.
 
-    The inertia has the order xx, yy, zz, yz, zx, xy. The products are written out, because sums of a linear algebra
-    library may depend on the length of the arrays.
+    The components of the inertia have the order xx, yy, zz, yz, zx, xy. The products are written out, because the sums
+    of a linear algebra library may depend on the length of the arrays.
     """
     x, y, z = r.T
     u, v, o = w.T
@@ -191,11 +192,11 @@ def _node_counts(model: Model, tets: Ints, groups: Groups, comm: Comm) -> Ints:
 
 
 def _finished(rows: "np.ndarray") -> "np.ndarray":
-    """Fills in the quantities that are computed from the sums: energies and extent. The energy of rotation is 1/2 L .
-    I^-1 L.
+    """Computes the derived quantities from the sums: energies and extent. The energy of rotation is 1/2 L . I^-1 L,
+    with the angular momentum L and the inertia I.
 
-    Axes without inertia have no angular momentum and are omitted. Before the call ``deformation`` is the kinetic energy
-    relative to the centre.
+    Axes without inertia have no angular momentum and are omitted. Before the call the column ``deformation`` contains
+    the kinetic energy relative to the centre.
     """
     xx, yy, zz, yz, zx, xy = rows["inertia"].T
     tensors = np.stack([xx, xy, zx, xy, yy, yz, zx, yz, zz], axis=1).reshape(-1, 3, 3)
@@ -210,9 +211,10 @@ def _finished(rows: "np.ndarray") -> "np.ndarray":
 
 
 def write(folder: Path, index: int, t: float, parts: list[str], rows: "np.ndarray") -> str:
-    """Writes the table of frame ``index``, atomically, and returns its path relative to the run's folder.
+    """Writes the table of fragments of frame ``index``, atomically. Returns the path of the file relative to the run's
+    folder.
 
-    The text of each number gives the bit-identical number when it is read.
+    Each number is written with enough digits that reading it gives the bit-identical number.
     """
     path = tables.path(folder, index)
     path.parent.mkdir(exist_ok=True)

@@ -46,7 +46,7 @@ class Handover:
     """Transfer of forces to the copies of separated nodes, on one rank."""
 
     def __init__(self, model: Model, meshes: dict[int, Mesh], neighbours: list[Neighbour], comm: Comm) -> None:
-        """``meshes``: meshes of the parts that fracture, by index of the block of tets."""
+        """``meshes``: meshes of the parts that fracture; the keys are the indices of the blocks of tets."""
         self._model, self._meshes, self._neighbours, self._comm = model, meshes, neighbours, comm
         self._room = Room(
             np.zeros(SCRATCH), np.zeros(9 * CHUNK, np.int64), np.zeros(_ROWS * CHUNK), np.zeros((CHUNK, 4), np.uint32)
@@ -76,7 +76,7 @@ class Handover:
         _apply(nodes.force, change, copies.parents, split.first)
 
     def _complete(self, change: Ints, parents: Ints) -> None:
-        """Adds the force changes that other ranks computed to the changes at shared copies."""
+        """Adds the force changes that other ranks computed for shared copies to ``change``."""
         shared = {o.rank: at for o in self._neighbours if len(at := common(parents, o.nodes))}
         if shared:
             received = self._comm.trade({rank: change[at] for rank, at in shared.items()}, shared)
@@ -95,8 +95,8 @@ def _apply(force, change, parents, first):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_ROOM, _N1, _I1, types.int64, MESH, POINTS, types.float64), cache=True, error_model="numpy")
 def _forces(room, place, chosen, n, mesh, x, scale):  # type: ignore[no-untyped-def]
-    """Computes the forces on nodes 1, 2, 3 of the chosen tets from their present stress (elements/forces.py), and
-    stores them in ``room.forces``. ``n``: number of tets.
+    """Computes the forces of the chosen tets on their nodes 1, 2, 3 from the present stress of the tets
+    (elements/forces.py), and stores these forces in ``room.forces``. ``n``: number of tets.
     """
     for i in range(n):
         e = place[chosen[i]]
@@ -116,8 +116,8 @@ def _forces(room, place, chosen, n, mesh, x, scale):  # type: ignore[no-untyped-
     error_model="numpy",
 )
 def _of_tets(change, node, place, corner, blocks, block, first, mesh, x, room, scale):  # type: ignore[no-untyped-def]
-    """Adds the forces of tets to the forces of copies. The tets are the tets of one ``block`` whose ``node`` (r,) is
-    now a copy; ``first``: local index of the first copy.
+    """Adds forces of tets to the forces of the copies. The tets are the tets of one ``block`` whose ``node`` (r,) is
+    now a copy. ``first``: local index of the first copy.
     """
     chosen, n = np.empty(CHUNK, np.int64), 0
     for r in range(len(node)):

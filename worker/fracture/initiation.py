@@ -1,4 +1,6 @@
-"""Fracture initiation. The steps are: candidates by tractions, the delayed criterion, and the order of breaking."""
+"""Fracture initiation in three steps: candidate facets are found by their tractions, filtered by the delayed criterion,
+and filtered by the order of breaking.
+"""
 
 import numpy as np
 
@@ -24,15 +26,15 @@ from .stars import Stars
 
 
 class Initiation:
-    """Search for the facets of one rank that break. Stores the clocks of the delayed criterion."""
+    """Search for the facets of one rank that break. The object stores the clocks of the delayed criterion."""
 
     def __init__(
         self, model: Model, bodies: list[Body], specs: dict[int, Fracture], stars: dict[int, Stars],
         neighbours: list[Neighbour], comm: Comm, clock: Clock, team: Team,
     ) -> None:  # fmt: skip
-        """``specs``: specifications of all parts that fracture, by number of the part; parts without a tet on this rank
-        are included. ``stars``: stars of the nodes, by index of the block of tets; ``team``: threads of the rank.
-        Collective.
+        """``specs``: specifications of all parts that fracture, also of parts without a tet on this rank; the keys are
+        the numbers of the parts. ``stars``: stars of the nodes; the keys are the indices of the blocks of tets.
+        ``team``: threads of the rank. Collective.
         """
         self._model, self._neighbours, self._comm, self._clock = model, neighbours, comm, clock
         self.bodies = bodies
@@ -57,14 +59,14 @@ class Initiation:
         return any(self._averaged)
 
     def begin_step(self, many: int = 1) -> None:
-        """Starts a new step, which is the last of ``many`` steps. If a facet is not overstressed in a step, its clock
-        stops.
+        """Starts the last of the next ``many`` steps; the steps before it had no overstressed facet. If a facet is not
+        overstressed in a step, its clock stops.
         """
         self._step += many
 
     def breaking(self, hot: bool) -> list[Breaking]:
-        """Returns the facets of each body that break by the present stress; ``hot``: whether a face of this rank is
-        overstressed. Collective among neighbours; with nodal tractions among all ranks.
+        """Returns the facets of each body that break by the present stress; ``hot``: True if at least one face of this
+        rank is overstressed. Collective among neighbours; if a part uses nodal tractions, collective among all ranks.
         """
         if not (hot or self.interface.hot or self.smooth):
             return []
@@ -72,12 +74,12 @@ class Initiation:
         return [some for some in every if some is not None]
 
     def candidates(self) -> list[tuple[Body, Candidates]]:
-        """Returns the bodies with candidates, and their candidates. This function must be called once a step, because
-        it advances the clocks. Collective in the same way as ``breaking``.
+        """Returns the bodies that have candidate facets, and these facets. This function must be called once in each
+        step, because it advances the clocks. It is collective among the same ranks as ``breaking``.
         """
         self.interface.exchange(self._model.nodes.x)
         x, t = self._model.nodes.x, self._clock.t
-        # With nodal tractions the delayed criterion is applied later, in _of_nodes.
+        # If a part uses nodal tractions, _of_nodes applies the delayed criterion later.
         steps = [self._step if body.spec.traction == "tets" else 0 for body in self.bodies]
         found = [(body, self._search.find(k, body, x, steps[k], t)) for k, body in enumerate(self.bodies)]
         if self.smooth:
@@ -85,8 +87,8 @@ class Initiation:
         return [(body, some) for body, some in found if len(some.place)]
 
     def strongest(self, broken: list[Breaking]) -> list[Breaking]:
-        """Filters the facets that break. In parts with ``order = "local_maximum"`` a facet is kept if it has the
-        largest ratio of traction to strength at all of its nodes. All facets of other parts are kept. Collective.
+        """Filters the facets that break. In a part with ``order = "local_maximum"`` a facet breaks only if it has the
+        largest ratio of traction to strength at all of its nodes. In other parts all facets break. Collective.
         """
         waiting = [b for b in broken if b.body.spec.order == "local_maximum"]
         none = np.zeros(0, np.int64)
@@ -101,7 +103,7 @@ class Initiation:
         return [b.take(next(left)) if b.body.spec.order == "local_maximum" else b for b in broken]
 
     def drop(self, block: int, mesh: Mesh, moves: Moves) -> None:
-        """Removes tets of the block with the index ``block``; ``mesh``: record of the block without these tets."""
+        """Removes tets of the block number ``index``; ``mesh``: record of the block without these tets."""
         some = [body for body in self.bodies if body.index == block]
         table = FacetTable(*(moves.applied(column) for column in some[0].facets))
         for body in some:
@@ -145,8 +147,8 @@ class Initiation:
         return [(body, left.get(body.index, each) if body.own else each) for body, each in found]
 
     def _of_nodes(self, some: list[tuple[Body, Candidates]]) -> dict[int, Candidates]:
-        """Returns the candidates that remain in bodies with nodal tractions, by index of the block of tets.
-        Collective.
+        """Returns the candidates that remain in bodies with nodal tractions; the keys are the indices of the blocks of
+        tets. Collective.
         """
         nodes, left = self._model.nodes, dict[int, Candidates]()
         wanted = np.zeros(nodes.n, bool)

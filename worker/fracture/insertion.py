@@ -12,10 +12,11 @@ from .cohesive import frames, fresh
 from .columns import Facets
 
 _LEAST = 0.05
-"""Smallest fraction of the square of the highest frequency resolved by the time step that cohesive facets may use."""
+"""Cohesive facets may use the fraction 1 - safety^2 of the square of the highest frequency that the time step resolves.
+This constant is the smallest value of that fraction."""
 _SHARES = 24.0
-"""Factor 4 * 3 * 2: a node has a quarter of the mass of its tet, up to three faces of the tet open at the node, and
-both nodes of a pair move."""
+"""Factor 4 * 3 * 2 in the stiffness limit of a facet. A node has a quarter of the mass of its tet, up to three faces of
+the tet open at the node, and both nodes of a pair move."""
 
 
 class Insertion:
@@ -25,11 +26,11 @@ class Insertion:
         """``safety``: safety factor of the time step."""
         self._unused = max(1.0 - safety**2, _LEAST)
         self.longest = 0.0
-        """Longest stable step so far, s, among the steps in which a face was overstressed."""
+        """Longest stable time step so far, s, among the steps in which a face was overstressed."""
 
     def facets(self, b: Breaking, nodes: Nodes, split: Split) -> Facets:
-        """Returns the cohesive facets that replace the broken facets ``b``, at the present positions. Only facets whose
-        first side is on this rank are returned.
+        """Returns the cohesive facets that replace the broken facets ``b``, at the present positions of the nodes. The
+        function returns only facets whose first side is on this rank.
         """
         f = b.facets
         before = np.concatenate([f.nodes, f.nodes], axis=1)
@@ -48,8 +49,8 @@ class Insertion:
 
 
 def shear_share(along: Floats, traction: Floats, weight: float) -> Floats:
-    """(m,) fraction of shear in the square of the effective traction: w t_s^2 / (<t_n>^2 + w t_s^2); ``along`` (m,):
-    component of the ``traction`` (m, 3) along the normal, Pa.
+    """(m,) fraction of shear in the square of the effective traction: w t_s^2 / (<t_n>^2 + w t_s^2). ``along`` (m,):
+    component t_n of the ``traction`` (m, 3) along the normal, Pa. ``weight``: weight w of shear.
     """
     shear = weight * np.maximum((traction * traction).sum(axis=1) - along * along, 0.0)
     whole = np.maximum(along, 0.0) ** 2 + shear
@@ -63,15 +64,16 @@ def inserted(
     """Returns new facets at the present positions.
 
     ``before`` and ``after`` (m, 6): nodes of the first side and the opposite nodes, before and after the separation of
-    nodes; ``traction`` (m, 3) on the outward normal of the first side and its ``effective`` size (m,), Pa; ``weight``
-    of shear; ``stiffness`` (m,) that the time step allows, Pa/m.
+    nodes; ``traction`` (m, 3): traction on the outward normal of the first side, Pa; ``effective`` (m,): its effective
+    size, Pa; ``weight``: weight of shear; ``stiffness`` (m,): largest stiffness that the time step allows, Pa/m.
     """
     frame = frames(nodes.x, before)
     along = (frame * traction[:, None]).sum(axis=2)
     along[:, 0] = np.maximum(along[:, 0], 0.0)
     shear = 1.0 / weight
-    # T = strength / e (<d_n> n + b^2 d_t) is the traction at insertion if d_n = e t_n / strength and d_t = e t_t / (b^2
-    # strength). Under pressure the effective traction contains only the shear beyond friction.
+    # The traction T = strength / e (<d_n> n + b^2 d_t) equals the traction at insertion if d_n = e t_n / strength and
+    # d_t = e t_t / (b^2 strength). If the facet is under pressure, the effective traction contains only the shear
+    # traction that exceeds friction.
     e = np.maximum(1.0, shear) * effective / stiffness
     pressed = along[:, 0] == 0.0
     across = np.sqrt(along[:, 1] ** 2 + along[:, 2] ** 2)

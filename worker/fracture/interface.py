@@ -59,8 +59,8 @@ class Interface:
         """True if a shared facet is overstressed on at least one side."""
 
     def words(self, hot: bool) -> Ints:
-        """(neighbours,) flags to send. A flag is 1 if a facet shared with that neighbour is overstressed on this side.
-        ``hot``: whether a tet of a shared node has an overstressed face.
+        """(neighbours,) flags to send. The flag for a neighbour is 1 if a facet shared with it is overstressed on this
+        side. ``hot``: True if a tet at a shared node has an overstressed face.
         """
         self.facets.hot[:] = 0
         for body, rows in zip(self._bodies, self._outer, strict=True):
@@ -74,8 +74,8 @@ class Interface:
         self.hot = bool(self.facets.hot.any())
 
     def mark_inner(self, hot: bool) -> None:
-        """Marks the overstressed facets between two blocks of this rank. This function must be called when all tets of
-        the rank have their stress. ``hot``: whether a face of the rank is overstressed.
+        """Marks the overstressed facets between two blocks of this rank. This function must be called after the stress
+        of all tets of the rank is computed. ``hot``: True if at least one face of the rank is overstressed.
         """
         if len(self._inner):
             self.facets.hot[-1] = 0
@@ -87,7 +87,7 @@ class Interface:
 
     def exchange(self, x: Floats) -> None:
         """Computes the tractions of this rank at the positions ``x`` (nodes, 3) and exchanges them with the neighbours.
-        Nothing is done if no shared facet is overstressed. Collective among neighbours.
+        The function does nothing if no shared facet is overstressed. Collective among neighbours.
         """
         if not self.hot:
             return
@@ -118,8 +118,9 @@ def _rows(index: int, body: Body) -> Ints:
 
 
 def _met(mine: Ints, theirs: Ints) -> Ints:
-    """(m, 6) rows of ``mine`` whose facet is among ``theirs`` (k, 2), ordered by facet id, with the bit pattern of the
-    other tet's mass. ``theirs`` was sent by another rank.
+    """(m, 6) rows of ``mine`` whose facet is also in ``theirs`` (k, 2), ordered by facet id. ``theirs`` was sent by
+    another rank; it has the facet id and the bit pattern of the mass of the other tet, and this mass is the last column
+    of the result.
     """
     theirs = theirs[np.argsort(theirs[:, 0])]
     at = places(theirs[:, 0], mine[:, 1])
@@ -129,6 +130,8 @@ def _met(mine: Ints, theirs: Ints) -> Ints:
 
 
 def _partners(table: Ints) -> Ints:
-    """(m,) row of the other side of each facet. ``table`` (m, 6) of ``_met`` contains both sides of each facet."""
+    """(m,) row of the other side of each facet. ``table`` (m, 6): result of ``_met``; it contains both sides of each
+    facet.
+    """
     order = np.argsort(table[:, 0])
     return np.asarray(order[np.searchsorted(table[order, 0], table[:, 1])])

@@ -1,9 +1,10 @@
 r"""Kernels of the traction-separation law of cohesive facets; cohesive.py draws the law.
 
-A pair is a node of the first side of a facet and the opposite node; each facet has three pairs. T = k d with the secant
-stiffness k = s(top) / top; a pair that closes can release the energy k (D^2 - lent^2) / 2 per area. If D decreased
-below ``lent``, the pair would release more energy than it absorbed. In that case the offset of the pair is first
-multiplied by a factor q below 1:
+A pair is a node of the first side of a facet and the opposite node; each facet has three pairs. The traction is T = k
+d, with the opening d and the secant stiffness k = s(top) / top, where top is the largest opening so far; a pair that
+closes can release the energy k (D^2 - lent^2) / 2 per area. D is the present effective opening, and lent is the opening
+e at insertion. If D decreased below ``lent``, the pair would release more energy than it absorbed. In that case the
+offset of the pair is first multiplied by a factor q below 1:
 
     d -> q d,   lent^2 -> max(lent^2 - (1 - q^2) D^2, 0),   k unchanged,
 
@@ -24,10 +25,10 @@ from ..parallel.words import add
 from .columns import COLUMNS, FACETS, Facets
 
 _SLACK = 1e-6
-"""Largest energy, divided by the fracture energy, that a pair may release beyond the energy that it absorbed; the
-chosen value is above round-off."""
+"""Energy that a pair may release beyond the energy that it absorbed, divided by the fracture energy. Chosen value:
+above round-off."""
 _EXHAUSTED = 1e-6
-"""Smallest energy, divided by the fracture energy, that remains to a pair after unloading. Chosen value."""
+"""Smallest energy that remains to a pair after unloading, divided by the fracture energy. Chosen value."""
 
 
 _F1, _F2, _F3 = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
@@ -65,7 +66,7 @@ def turn(frame, x, nodes):  # type: ignore[no-untyped-def]
 
 @njit(_F(FACETS, _I, _I), cache=True, error_model="numpy")
 def _share(f, m, p):  # type: ignore[no-untyped-def]
-    """Returns the remaining traction of a pair divided by its initial strength, s / strength."""
+    """Returns the ratio s / strength: the remaining traction of a pair divided by its initial strength."""
     law, s = f.softening, f.state
     beyond = s.top[m, p] - law.knee[m, p]
     return 1.0 if beyond <= 0.0 else max(1.0 - beyond / law.critical[m, p], 0.0)
@@ -84,8 +85,8 @@ def _opened(d, frame, apart, offset, shear):  # type: ignore[no-untyped-def]
 
 @njit(types.void(FACETS, _I, _I, _F2, _F1, _F), cache=True, error_model="numpy")
 def _shorten(f, m, p, frame, d, kept):  # type: ignore[no-untyped-def]
-    """Multiplies the present opening ``d`` of a pair by ``kept``, by a change of its offset. The formulas are at the
-    top of the file.
+    """Multiplies the present opening ``d`` of a pair by the factor ``kept``, by a change of the offset of the pair. The
+    formulas are at the top of the file.
     """
     law, s = f.softening, f.state
     k = law.strength[m, p] * _share(f, m, p) / s.top[m, p]
@@ -112,7 +113,8 @@ def _shorten(f, m, p, frame, d, kept):  # type: ignore[no-untyped-def]
 @njit(TASK, cache=True, error_model="numpy")
 def open_facets(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """Task: computes openings, tractions and work of facets at the positions ``x``. Counts in ``failed`` (tasks,) the
-    facets that have failed at all three pairs. The work is computed with the mean of the old and the new force.
+    facets that have failed at all three pairs. The work in a step is the mean of the old and the new force times the
+    change of the opening.
     """
     tets, nodes, constants, softening, state, x, failed = _read_open(table)
     f, many = Facets(tets, nodes, constants, softening, state), 0
@@ -145,8 +147,8 @@ def open_facets(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, FACETS, _I, _I, _F2, _I2, _F1, _F), cache=True, error_model="numpy")
 def _foresee(ahead, f, m, p, v, force, mass, quantum):  # type: ignore[no-untyped-def]
-    """Sets ``ahead`` to the opening velocity of a pair at n+1/2 that would result if only the present nodal forces
-    acted.
+    """Sets ``ahead`` to the opening velocity of a pair at n+1/2. The velocity is the one that would result if only the
+    present nodal forces acted.
     """
     a, b = f.nodes[m, p], f.nodes[m, 3 + p]
     for i in range(3):
@@ -181,7 +183,7 @@ def unload(table, first, stop, thread):  # type: ignore[no-untyped-def]
             short = law.lent[m, p] - _opened(d, frame, apart, law.offset[m, p], f.constants.shear[m])
             if short <= _SLACK * f.constants.energy[m] / law.strength[m, p]:
                 continue
-            # A traction that is lowered by dF opens the pair along the traction by dt^2 dF (1 / m_a + 1 / m_b) more.
+            # If a traction is lowered by dF, the pair opens further along the traction, by dt^2 dF (1 / m_a + 1 / m_b).
             # The effective opening D increases by this amount times |T| / (k D).
             size = _opened(d, frame, s.opening[m, p], law.offset[m, p], f.constants.shear[m])
             strength = np.sqrt(pull[0] ** 2 + pull[1] ** 2 + pull[2] ** 2)
@@ -243,7 +245,7 @@ def scatter_copies(change, first, nodes, pull, scale):  # type: ignore[no-untype
 
 @njit("int64[::1](int32[:, ::1], int64[::1], int64)", cache=True)
 def touching(table, some, n):  # type: ignore[no-untyped-def]
-    """Returns the indices of the rows of ``table`` (m, 6) that contain one of the nodes ``some``; ``n``: number of
+    """Returns the indices of the rows of ``table`` (m, 6) that contain at least one node of ``some``; ``n``: number of
     nodes.
     """
     flags, rows, found = np.zeros(n, np.bool_), np.empty(len(table), np.int64), 0

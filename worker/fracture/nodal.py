@@ -2,7 +2,7 @@
 smoother than the mean of its two tets.
 
 The stress of a node is the mean stress of its tets, weighted with their initial volumes. The sums are sums of integers,
-so that the two sides of a facet compute the same traction on any ranks; a facet is a candidate only if it also passes
+so that the two sides of a facet compute the same traction on all ranks. A facet is a candidate only if it also passes
 the criterion with the stress of its two tets (criterion.py).
 """
 
@@ -21,7 +21,7 @@ from .records import CANDIDATES, INTERFACE, MESH, POINTS, Candidates, InterfaceF
 from .stars import Stars
 
 _QUANTA = 2.0**30
-"""Number of quanta in the strength, and number of quanta in the mass of the heaviest tet."""
+"""Number of quanta in the strength of a part, and number of quanta in the mass of its heaviest tet."""
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _MASS = PRESSURE * CHUNK, MASS * CHUNK
@@ -39,7 +39,7 @@ def stresses(
     ``wanted`` nodes and for the shared nodes of the bodies; zero at other nodes.
 
     ``heaviest`` (parts,): mass of the heaviest tet of each part on all ranks, kg. The quantum of a sum depends on this
-    mass and on the strength of the part, so two of the bodies must not have a common node. Collective.
+    mass and on the strength of the part. Therefore two bodies in one call must not have a common node. Collective.
     """
     sums, strength = np.zeros((nodes.n, 7), np.int64), np.zeros(nodes.n)
     for other in neighbours:
@@ -82,7 +82,8 @@ def _add(sums, nodes, first, count, pool, mesh, of_stress, of_mass):  # type: ig
 
 def replace(found: Candidates, shared: InterfaceFacets, body: Body, stress: Floats, x: Floats) -> None:
     """Sets the tractions of candidates of ``body`` from the ``stress`` (nodes, 6) of their nodes, at the positions
-    ``x`` (nodes, 3). A traction that exceeds the effective traction of the two tets is reduced to it.
+    ``x`` (nodes, 3). If the effective size of a new traction exceeds that of the mean traction of the two tets, it is
+    reduced to the latter.
     """
     _replace(found, shared, body.mesh, stress, x, body.law.weight, body.spec.friction)
 

@@ -16,8 +16,8 @@ def strongest(facets: Ints, load: Floats, nodes: Indices, ids: Ints, neighbours:
     """(m,) whether each facet has the largest load at all of its nodes. If two loads are equal, the load of the facet
     with the smaller id counts as larger.
 
-    ``facets`` (m,): ids of the facets; ``load`` (m,): positive; ``nodes`` (m, 3): local nodes; ``ids`` (nodes,): global
-    ids. Collective.
+    ``facets`` (m,): ids of the facets; ``load`` (m,): ratio of traction to strength, positive; ``nodes`` (m, 3): local
+    nodes; ``ids`` (nodes,): global ids. Collective.
     """
     order = -np.ascontiguousarray(load).view(np.int64)
     mine = np.column_stack([ids[nodes].reshape(-1), np.repeat(order, 3), np.repeat(facets, 3)])

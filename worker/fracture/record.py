@@ -30,15 +30,16 @@ class Record:
         """Label of the fragment of each tet (``connectivity``) at the last ``update``: one array (n,) for each block of
         tets."""
         self.numbers: list[Ints] = []
-        """Number of the fragment of each tet in the last frame: one array (n,) for each block of tets. A fragment keeps
-        its number while it exists."""
+        """Number of the fragment of each tet in the last frame: one array (n,) for each block of tets. A fragment has
+        the same number as long as it exists."""
         self._before: tuple[Ints, Ints] = np.zeros(0, np.int64), np.zeros(0, np.int64)
         """Ids of the tets, ascending, and their fragment numbers in the last frame."""
         self._family: Ints = np.zeros((0, 3), np.int64)
         self.count = 0
         """Number of fragments at the last ``update``."""
         self.initial = self.next = 0
-        """Number of fragments at the start, which have the smallest numbers; then the next free number."""
+        """Number of fragments at the start. These fragments have the smallest numbers. The second value is the next
+        free number."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the numbers of the last frame to a parcel (a checkpoint or migration message)."""
@@ -55,15 +56,15 @@ class Record:
             self._remember(_flat([table["id"] for table in tables]), _flat([table["fragment"] for table in tables]))
 
     def update(self) -> None:
-        """Finds the present fragments, by their labels."""
+        """Finds the present fragments and their labels."""
         cohesion = self._fracture.cohesion
         held = cohesion.facets.tets if cohesion is not None else np.zeros((0, 2), np.int64)
         self.labels = self._connectivity.labels(held)
         self.count = count(self._model, self.labels, self._comm)
 
     def number(self) -> None:
-        """Numbers the fragments that the last ``update`` found. The method must be called at the start and at frames
-        only. Frames are at the same times in every run of a case, so the numbers are reproducible.
+        """Gives numbers to the fragments that the last ``update`` found. The method must be called at the start and at
+        frames only. The times of frames are equal in every run of a case, so the numbers are reproducible.
         """
         ids = _flat([block.id for block in self._model.blocks])
         found, self._family = numbered(self._last(ids), _flat(self.labels), self.next, self._comm)

@@ -21,27 +21,27 @@ class Mesh(NamedTuple):
     beside: Indices
     """(n, 4) place of the neighbour tet behind each face; -1 if there is no tet, -2 if the tet is on another rank."""
     bond: Bits
-    """(n, 4) state of each facet: INTACT, BROKEN or WIDE."""
+    """(n, 4) state of each facet of each tet: INTACT, BROKEN or WIDE."""
     intact: Bits
-    """(n,) bit k is set if facet k is intact and its two tets are in this block."""
+    """(n,) bits of each tet: bit k is set if facet k is intact and its two tets are in this block."""
     state: Floats
     """Element state of the whole block of tets, as a flat array."""
     columns: int
-    """Number of state rows."""
+    """Number of rows of the element state."""
 
 
 class FacetTable(NamedTuple):
-    """Facets of a body. The indices are place and local face of the tet of smaller id, or of the only tet in the
-    block.
+    """Facets of a body. A facet has two indices: the place and the local face of its tet of smaller id. If only one tet
+    of the facet is in the block, the indices are those of this tet.
     """
 
     strength: Floats
     """(n, 4) strength of each facet, Pa, equal on both sides; infinite for faces on the surface."""
     since: Floats
-    """(n, 4) start time of the clock of the delayed criterion, s."""
+    """(n, 4) time at which the clock of the delayed criterion started, s."""
     seen: Ints
-    """(n, 4) number of the last step in which the facet was overstressed; the clock continues if this was the previous
-    step."""
+    """(n, 4) number of the last step in which the facet was overstressed. The clock continues if this step was the
+    previous step."""
 
 
 class InterfaceFacets(NamedTuple):
@@ -50,11 +50,11 @@ class InterfaceFacets(NamedTuple):
     """
 
     sides: Indices
-    """(m, 2) place and face of this rank's tet."""
+    """(m, 2) place of this rank's tet of each facet, and local face of this tet."""
     first: Flags
-    """(m,) whether this rank has the tet of smaller id of each facet."""
+    """(m,) True if this rank has the tet of smaller id of the facet."""
     mass: Floats
-    """(m,) mass of the other tet, kg."""
+    """(m,) mass of the other tet of each facet, kg."""
     own: Floats
     """(m, 3) traction of this rank's tet on the outward normal of the tet of smaller id, Pa."""
     theirs: Floats
@@ -76,7 +76,7 @@ class Law(NamedTuple):
     friction: float
     """Coefficient of internal friction."""
     delay: float
-    """Characteristic time t_c of the delayed criterion times the square of the strength, Pa^2 s."""
+    """Product of the characteristic time t_c of the delayed criterion and the square of the strength, Pa^2 s."""
 
 
 class Candidates(NamedTuple):

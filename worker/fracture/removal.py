@@ -1,7 +1,7 @@
-"""Removal of tets by erosion from bodies that break: the tables of fracture without these tets, and the stars that the
+"""Removal of eroded tets from bodies that break. The module updates the tables of fracture and finds the stars that the
 removal cuts.
 
-A removed tet takes its facets with it. Erosion (worker/erosion.py) removes tets at the start of a step:
+The facets of a removed tet are removed, too. Erosion (worker/erosion.py) removes tets at the start of a step:
 
     1. Open the narrow cracks at the tets: the side that remains is surface from now on.     begin
     2. Close their cohesive facets, whose last traction acts in one more step.               begin
@@ -40,7 +40,9 @@ class Removal:
         """Local nodes, ascending, of the tets that are removed in this step."""
 
     def begin(self, worn: list[Ints]) -> None:
-        """Prepares the removal of the tets ``worn`` (k,) of each block. Collective."""
+        """Prepares the removal of the tets ``worn`` (k,) of each block; ``worn`` are the tets that meet the erosion
+        criterion. Collective.
+        """
         none, blocks = np.zeros(0, np.int64), self._model.blocks
         some = [(block, gone) for block, gone in zip(blocks, worn, strict=True) if len(block.bond)]
         corners = [block.tets[gone].reshape(-1).astype(np.int64) for block, gone in some]
@@ -53,7 +55,7 @@ class Removal:
             self._cohesion.close(gone)
 
     def drop(self, index: int, moves: Moves) -> None:
-        """Follows the removal of tets from the block with this ``index``."""
+        """Updates the tables after the removal of tets from the block number ``index``."""
         if index not in self._separation.stars:
             return
         places, block = moves.places, self._model.blocks[index]
@@ -65,7 +67,7 @@ class Removal:
 
     def end(self, gone: Ints, held: Flags) -> None:
         """Completes the tables, and chooses the nodes of the removed tets for the separation at the end of the step;
-        ``gone`` (k, exposure.WORDS): the removed tets; ``held`` (nodes,): nodes that have tets. Collective.
+        ``gone`` (k, exposure.WORDS): the removed tets; ``held`` (nodes,): True for nodes that have tets. Collective.
         """
         if self._contact is None:
             rows = self._comm.join(gone.reshape(-1)).reshape(-1, exposure.WORDS)

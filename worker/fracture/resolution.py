@@ -1,5 +1,5 @@
-"""Resolution of fracture by the mesh. Two ratios are checked: element size to cohesive zone, and opening in one time
-step to critical opening.
+"""Resolution of fracture by the mesh. Two ratios are checked: element size to length of the cohesive zone, and opening
+in one time step to critical opening.
 """
 
 import logging
@@ -11,15 +11,15 @@ from ..materials.elementary import power
 from .strength import Toughness
 
 _RESOLVED = 1.0 / 3.0
-"""Largest ratio of element size to cohesive zone at which the dissipated energy equals the fracture energy of the
-law."""
+"""Largest ratio of element size to length of the cohesive zone at which the dissipated energy still equals the fracture
+energy of the law."""
 _STEP = 1.0 / math.sqrt(6.0)
-"""Stable time step of a regular tet, times the wave speed, divided by the edge."""
+"""Stable time step of a regular tet, multiplied by the wave speed and divided by the length of an edge."""
 _REGULAR = 6.0 * math.sqrt(2.0)
-"""Cube of the edge of a regular tet, divided by its volume."""
+"""Cube of the edge length of a regular tet, divided by its volume."""
 _ROUNDING = 1e-9
-"""Relative tolerance of the ratio of element size to cohesive zone. If a strength was lowered to reach a given ratio,
-the ratio has round-off."""
+"""Relative tolerance of the ratio of element size to cohesive zone. If the strength was lowered to reach a given ratio,
+the computed ratio has round-off."""
 _NAMED = 5
 """Largest number of parts named in a warning. Chosen value."""
 
@@ -27,15 +27,15 @@ log = logging.getLogger("conoid.worker")
 
 
 def edge(volume: float) -> float:
-    """Returns the edge, m, of a regular tet of this ``volume``, m^3."""
+    """Returns the edge length, m, of a regular tet of this ``volume``, m^3."""
     return float(power(_REGULAR * volume, 1.0 / 3.0))
 
 
 def warnings(part: Part, tough: Toughness, size: float, safety: float) -> list[str]:
     """Returns the warnings for a part with tets of edge ``size``, m; ``safety``: safety factor of the time step.
 
-    The opening of a facet in one step is estimated from the release of its stress and from the initial stretch rate of
-    the part.
+    The opening of a facet in one time step is estimated from the release of its stress and from the initial stretch
+    rate of the part.
     """
     spec = part.fracture
     assert spec is not None

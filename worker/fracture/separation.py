@@ -3,8 +3,8 @@ ids of the copies are independent of the number of ranks.
 
 A rank that has a node has all copies of the node. The completed sums of a shared node are therefore available on both
 sides of a facet, on any rank that computes one of the sides. Only the ranks that have a node of a broken facet execute
-the steps 1 to 6. All ranks receive the list of these ranks in the reduction of the step; a rank that is not in the list
-continues with its next step.
+the following steps 1 to 6. All ranks receive the list of these ranks in the reduction of the step; a rank that is not
+in the list continues with its next step.
 
     1. mark the broken facets and their nodes, and the         survey
        nodes of tets that erosion has removed in this step
@@ -44,12 +44,12 @@ class Separation:
     def __init__(
         self, model: Model, neighbours: list[Neighbour], meshes: dict[int, Mesh], comm: Comm, threads: Team
     ) -> None:
-        """``meshes``: meshes of the parts that fracture, by index of the block of tets. The removal of tets replaces
-        the meshes.
+        """``meshes``: meshes of the parts that fracture; the keys are the indices of the blocks of tets. The removal of
+        tets replaces the meshes.
         """
         self._model, self._neighbours, self._comm = model, neighbours, comm
         self.stars = {b: Stars(mesh.tets, model.nodes.n, threads) for b, mesh in meshes.items()}
-        """Stars of the nodes, by index of the block of tets."""
+        """Stars of the nodes; the keys are the indices of the blocks of tets."""
         for star in self.stars.values():
             model.nodes.columns.declare(star, **Stars.COLUMNS)
         self._pieces = Pieces(threads)
@@ -57,14 +57,15 @@ class Separation:
         self.broken = 0
         """Number of broken facets on all ranks."""
         self.first = math.nan
-        """Time at which the first facet broke, s."""
+        """Simulated time at which the first facet broke, s."""
         self._mine = self.cut = _NO_NODES
-        """Local nodes, ascending, whose stars may be cut in this step: of the facets that break, and of removed tets.
-        """
+        """Local nodes, ascending, whose stars may be cut in this step. These are the nodes of facets that break and the
+        nodes of removed tets."""
 
     def survey(self, broken: list[Indices], count: int, touched: Ints) -> None:
         """Marks facets as broken. Sets ``touched`` (ranks,) to 1 for each rank that has a node of a broken facet; the
-        value for this rank is 1 + ``count``, where ``count`` is the number of broken facets whose first side is here.
+        value for this rank is 1 + ``count``, where ``count`` is the number of broken facets whose first side is on this
+        rank.
 
         ``broken``: tables (m, 2, 3) of block, place and face of each side; -1 for a side on another rank.
         """
@@ -82,9 +83,9 @@ class Separation:
     def separate(self, touched: Ints) -> Split:
         """Separates the nodes of the broken facets; returns the topology change.
 
-        ``touched``: maximum over all ranks. Collective among the ranks with a value above 0. The method changes
-        connectivity, masses and shared nodes; the caller moves the forces. Ranks without a changed node receive the new
-        number of nodes in the reduction of the next step.
+        ``touched`` (ranks,): maximum over all ranks of ``touched`` of ``survey``. Collective among the ranks whose
+        value in ``touched`` is above 0. The method changes connectivity, masses and shared nodes; the caller moves the
+        forces. Ranks without a changed node receive the new number of nodes in the reduction of the next step.
         """
         self.broken += int(touched.sum() - np.count_nonzero(touched))
         if not touched[self._comm.rank]:
@@ -111,7 +112,7 @@ class Separation:
         return Split(copies, new, touched, *_leaving(rows, places, of, new))
 
     def _split_shares(self, rows: Ints, of: Ints, some: Ints, new: int) -> None:
-        """Updates the mass that each part has in a separated node of several parts, and in the copies of this node.
+        """Updates, for each separated node of several parts and for its copies, the mass that each part contributes.
         ``rows``: rows of the stars of the nodes ``some``.
         """
         nodes = self._model.nodes
@@ -162,7 +163,7 @@ class Separation:
         return [words.reshape(-1, stars.COLUMNS) for words in self._comm.trade(sends, sends).values() if len(words)]
 
     def _number(self, mine: Ints, touched: Ints) -> Ints:
-        """(k, 2) node and label of every piece that gets a copy, of all ranks, in the order of the new node ids."""
+        """(k, 2) node and label of every piece that gets a copy, on all ranks, in the order of the new node ids."""
         others = [rank for rank in np.flatnonzero(touched).tolist() if rank != self._comm.rank]
         if not others:
             return mine
@@ -179,13 +180,13 @@ class Separation:
 
 
 def _positions(every: Ints, mine: Ints) -> Ints:
-    """(k,) indices of the rows ``mine`` (k, 2) among the rows ``every``; both arrays are sorted."""
+    """(k,) indices in ``every`` of the rows ``mine`` (k, 2); both arrays are sorted."""
     return np.arange(len(mine)) if len(every) == len(mine) else np.searchsorted(keys(*every.T), keys(*mine.T))
 
 
 @njit(types.int64[::1](_I1), cache=True)
 def distinct(values):  # type: ignore[no-untyped-def]
-    """Returns the distinct values, ascending."""
+    """Returns the distinct values of an array, ascending."""
     out, n = np.sort(values), 0
     for value in out:
         if n == 0 or value != out[n - 1]:
@@ -196,8 +197,8 @@ def distinct(values):  # type: ignore[no-untyped-def]
 
 @njit(types.int64[::1](MESH, types.int64, types.int32[:, :, ::1]), cache=True)
 def _broken(mesh, block, sides):  # type: ignore[no-untyped-def]
-    """Marks the facets of the ``sides`` (m, 2, 3) in this ``block`` of tets as broken. Returns the nodes of the facets,
-    each node once.
+    """Marks the facets of ``sides`` (m, 2, 3) that are in this ``block`` of tets as broken. Returns the nodes of the
+    facets, each node once.
     """
     nodes, n = np.empty(6 * len(sides), np.int64), 0
     for m in range(len(sides)):
@@ -246,8 +247,8 @@ def _stretches(rows, begin, end):  # type: ignore[no-untyped-def]
 
 @njit(several(_I1, _N1, _N1, _N1, _N1)(_I2, _I2, _I1, types.int64), cache=True)
 def _leaving(rows, places, of, new):  # type: ignore[no-untyped-def]
-    """Selects the rows whose node becomes a copy. Returns for each row: key of node and tet, the copy, and place,
-    corner and block of the tet.
+    """Selects the rows whose node becomes a copy. Returns several values for each row: the key of node and tet, the
+    copy, and the place, corner and block of the tet.
     """
     m = (of >= 0).sum()
     key, found, n = np.empty(m, np.int64), np.empty((4, m), np.int32), 0

@@ -2,12 +2,13 @@
 
 The stage acts at the end of a step, with the stress at n+1; facets that pass the criterion break. A node whose star is
 no longer connected gets copies. The forces of the tets of a copy are moved, as integers, from the parent to the copy.
-Every table by node is extended by the copies. In ``cohesive`` parts a broken facet keeps its traction, which decreases
-with the opening.
+Every table with one row for each node is extended by the copies. In ``cohesive`` parts a broken facet keeps its
+traction, which decreases with the opening.
 
-The reduction of the step contains whether a facet breaks, and on which ranks. The method ``find`` is called before the
-reduction, and ``advance`` after it. Flags from the neighbour ranks show whether a shared facet is overstressed. A rank
-continues immediately with the next step if it has no node of a broken facet, and no ghosts of a rank with such a node.
+The reduction of the step transfers two values: whether a facet breaks, and the ranks that have a node of a broken
+facet. The method ``find`` is called before the reduction, and ``advance`` after it. Flags from the neighbour ranks show
+whether a shared facet is overstressed. A rank continues immediately with the next step if it has no node of a broken
+facet, and no ghosts of a rank with such a node.
 """
 
 import math
@@ -40,8 +41,8 @@ from .unloading import Unloading
 from .update import TopologyUpdate
 
 NOTHING, OVERSTRESSED, BREAKS = range(3)
-"""State of the facets in a step, of which all ranks use the maximum. NOTHING: no face is overstressed; OVERSTRESSED:
-some faces are; BREAKS: facets break, or may break."""
+"""State of the facets in a step; all ranks use the maximum of the values of all ranks. NOTHING: no face is
+overstressed. OVERSTRESSED: some faces are overstressed. BREAKS: facets break, or may break."""
 
 
 class Fracture:
@@ -51,7 +52,9 @@ class Fracture:
         self, case: Case, model: Model, neighbours: list[Neighbour], elements: Elements, by_node: list[KeptByNode],
         contact: Contact | None, comm: Comm, clock: Clock, team: Team,
     ) -> None:  # fmt: skip
-        """``by_node``: objects with arrays by node, except the elements; ``team``: threads of the rank. Collective."""
+        """``by_node``: all objects that have arrays by node, except the elements; ``team``: threads of the rank.
+        Collective.
+        """
         self._model, self._elements, self._clock, self._comm = model, elements, clock, comm
         bodies, work, self.warnings = self._bodies(case)
         meshes = {body.index: body.mesh for body in bodies}
@@ -64,7 +67,7 @@ class Fracture:
         if neighbours:
             elements.attach(self.initiation.interface)
         self._found: list[Breaking] | None = None
-        """Facets that break in this step; None before the search for these facets."""
+        """Facets that break in this step; the value is None before the search for these facets."""
         self.cohesion: Cohesion | None = None
         if cohesive(case):
             self.cohesion = elements.cohesion = Cohesion(work, team)
@@ -77,11 +80,11 @@ class Fracture:
 
     @property
     def first(self) -> float:
-        """Time at which the first facet of all ranks broke, s; NaN if no facet has broken."""
+        """Simulated time at which the first facet of all ranks broke, s; NaN if no facet has broken."""
         return self.separation.first
 
     def removal(self, case: Case, contact: Contact | None) -> Removal | None:
-        """Returns the removal of tets from bodies that break; None if no part of these bodies erodes."""
+        """Returns the object that removes tets from bodies that break; None if no part of these bodies erodes."""
         if not wearing(case):
             return None
         of = self._model, self.initiation, self.separation, self.cohesion
@@ -104,9 +107,9 @@ class Fracture:
         self.initiation.begin_step(steps)
 
     def find(self, touched: Ints) -> int:
-        """Returns the value of this rank for the reduction of the step: NOTHING, OVERSTRESSED or BREAKS. With nodal
-        tractions the value is BREAKS if a facet may break. Sets ``touched`` (ranks,) for the ranks that have a node of
-        a facet that breaks. Collective among neighbours.
+        """Returns the value of this rank for the reduction of the step: NOTHING, OVERSTRESSED or BREAKS. If a part uses
+        nodal tractions, the value is BREAKS if a facet may break. Sets ``touched`` (ranks,) for the ranks that have a
+        node of a facet that breaks. Collective among neighbours.
         """
         self.initiation.begin_step()
         hot, self._found, touched[:] = self._elements.hot, None, 0
@@ -123,8 +126,8 @@ class Fracture:
 
     def advance(self, agreed: int, touched: Ints) -> None:
         """Breaks the facets. ``agreed``, ``touched``: maxima over the ranks of the results of ``find``. All ranks must
-        call the method. Collective among all ranks with nodal tractions or ``order = "local_maximum"``, else among the
-        touched ranks.
+        call the method. If a part uses nodal tractions or ``order = "local_maximum"``, collective among all ranks, else
+        among the touched ranks.
         """
         if agreed >= OVERSTRESSED:
             self._insertion.longest = max(self._insertion.longest, self._clock.stable)

@@ -40,8 +40,8 @@ tet, rank of the tet, bit pattern of its mass, kg. For each of the three faces t
 of the tet behind the face; -1 if the face is not an intact facet."""
 COLUMNS = 7
 PLACE, CORNER, BLOCK = 0, 1, 2
-"""Columns of the place of the tet of a row: place in its block, corner that is the node, index of the block; all are -1
-for a tet of another rank."""
+"""Columns of the place of the tet of a row: place of the tet in its block, corner of the tet that is the node, and
+index of the block. All three are -1 for a tet of another rank."""
 _I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
 
 
@@ -55,7 +55,7 @@ _NODES = 8
 class Stars:
     """Stars of all nodes of one block: a pool of tets in which the tets of each node are contiguous.
 
-    When a node separates, its range of the pool is divided among the node and its copies.
+    When a node separates, its range in the pool is divided among the node and its copies.
     """
 
     COLUMNS: ClassVar = {"first": ZERO, "count": ZERO}
@@ -98,8 +98,8 @@ class Stars:
         """Replaces separated nodes in the tets (n, 4) of this block, and divides the ranges of the pool.
 
         ``rows`` (r, COLUMNS): complete stars of the local ``nodes`` (k,), sorted; ``places`` (r, 3): places of their
-        tets. ``of`` (r,): number of the piece; -1 for the piece that keeps its node; piece 0 gets the local node
-        ``new``. ``block``: index of this block.
+        tets. ``of`` (r,): number of the piece of each row; -1 for the piece that keeps its node. Piece 0 gets the local
+        node ``new``. ``block``: index of this block.
         """
         _reconnect(self.pool, self.first, self.count, tets, nodes, rows, places, of, new, block)
 
@@ -149,7 +149,9 @@ def _row(rows, places, r, e, a, ids, mesh, block, rank):  # type: ignore[no-unty
 
 
 def ordered(rows: Ints, places: Ints) -> tuple[Ints, Ints]:
-    """Sorts the rows by node and tet. ``places`` (p, 3) belong to the first p rows; the other rows get -1."""
+    """Sorts the rows by node and tet. ``places`` (p, 3): places of the tets of the first p rows; the other rows get the
+    place -1.
+    """
     order = np.argsort(keys(rows[:, NODE], rows[:, TET]))
     every = np.concatenate([places, np.full((len(rows) - len(places), 3), -1)])
     return rows[order], every[order]
@@ -172,7 +174,7 @@ def _join(parent, rows, begin, end):  # type: ignore[no-untyped-def]
     for i in range(begin, end):
         for m in range(BEHIND, COLUMNS):
             behind, j = rows[i, m], i + 1
-            if behind <= rows[i, TET]:  # the face is no facet, or its facet was joined from the other side
+            if behind <= rows[i, TET]:  # the face is not a facet, or its facet was joined from the other side
                 continue
             while j < end and rows[j, TET] < behind:
                 j += 1
@@ -188,7 +190,7 @@ def _join(parent, rows, begin, end):  # type: ignore[no-untyped-def]
 
 
 class Pieces:
-    """Cuts stars into pieces, by the threads of a rank."""
+    """Object that cuts stars into pieces on the threads of a rank."""
 
     def __init__(self, threads: Team) -> None:
         self._cut, self._scratch = Pass(threads, _cut, *_CUT, size=_NODES), Scratch()
@@ -197,9 +199,10 @@ class Pieces:
         """Returns the pieces that separate from their nodes, ordered by node and smallest tet. ``rows``: star rows,
         ordered by node and tet; ``begins`` (k + 1,): first row of each node.
 
-        The first result (r,) is the piece of each row, valid until the next call; -1 in the piece with the smallest
-        tet, which keeps the node. Further results for each piece: ids of its node and of its smallest tet, index of the
-        node among the nodes of ``rows``, rank of the smallest tet, and a quarter of the mass of its tets, kg.
+        The first result (r,) is the number of the piece of each row, valid until the next call. It is -1 for the piece
+        with the smallest tet, which keeps the node. Further results have one value for each piece: id of its node, id
+        of its smallest tet, index of the node among the nodes of ``rows``, rank of the smallest tet, and a quarter of
+        the mass of its tets, kg.
         """
         n = len(begins) - 1
         of, parent, many = (self._scratch.of(name, m) for name, m in (("of", len(rows)), ("p", len(rows)), ("m", n)))

@@ -31,10 +31,11 @@ class Toughness:
     energy: float
     scatter: Scatter | None
     delay: float
-    """Characteristic time t_c times the square of the strength, Pa^2 s; the time t_c of a facet is this value divided
-    by the square of its own strength."""
+    """Characteristic time t_c times the square of the strength, Pa^2 s; the characteristic time of a facet is this
+    value divided by the square of its own strength."""
     zone: float
-    """Length of the cohesive zone, m, 9 pi / 32 E' G_c / strength^2 with E' = E / (1 - nu^2)."""
+    """Length of the cohesive zone, m: 9 pi / 32 E' G_c / strength^2, with E' = E / (1 - nu^2), Young's modulus E,
+    Poisson's ratio nu and the fracture energy G_c."""
     speed: float
     """Speed of plane waves, m/s."""
     density: float
@@ -48,14 +49,15 @@ class Toughness:
 
     @property
     def critical(self) -> float:
-        """Opening at zero traction, m."""
+        """Opening at which the traction becomes zero, m."""
         return 2.0 * self.energy / self.strength
 
     def energies(self, share: Floats) -> Floats:
         """(m,) fracture energies, J/m^2; ``share`` (m,): fraction of shear in the square of the effective traction.
 
-        For a proportional opening ``share`` is the fraction of the work that is done in shear. Facets break at w_n /
-        energy + w_s / shear_energy = 1 (Wu and Reuter 1965, exponent 1; docs/theory/bonds.md, Bonds).
+        If normal and shear opening grow in proportion, ``share`` is the fraction of the work that is done in shear.
+        Facets break if w_n / energy + w_s / shear_energy = 1, with the work w_n of the normal traction and the work w_s
+        of the shear traction (Wu and Reuter 1965, exponent 1; docs/theory/bonds.md, Bonds).
         """
         if self.shear_energy is None:
             return np.full(len(share), self.energy)
@@ -68,7 +70,7 @@ class Toughness:
             return np.full(len(face), self.strength)
         share = np.ones(len(face)) if scatter.area is None else scatter.area / area
         drawn = _weibull(uniform(face, scatter.seed), share, scatter.modulus)
-        with np.errstate(over="ignore"):  # a modulus far below 1 gives infinite strengths
+        with np.errstate(over="ignore"):  # a shape parameter far below 1 gives infinite strengths
             return np.asarray(scatter.minimum + (self.strength - scatter.minimum) * drawn)
 
 
@@ -150,7 +152,7 @@ def _zone(plane: float, energy: float) -> float:
 
 
 def _scaled(brittle: Brittle, strength: float) -> Scatter | None:
-    """Returns the scatter that belongs to a strength that was lowered for the mesh."""
+    """Returns the scatter of strengths for a strength that was lowered for the mesh."""
     if brittle.scatter is None:
         return None
     lowest = brittle.scatter.minimum * strength / brittle.strength

@@ -10,7 +10,7 @@ from . import facets, resolution
 from .strength import UNBREAKABLE, Toughness, of_bond, terms, toughness
 
 _LAST = 2**28
-"""Upper bound of the global ids of tets."""
+"""Number that is larger than all global ids of tets."""
 
 
 class Terms:
@@ -45,7 +45,7 @@ class Terms:
         return resolution.merged(self._found)
 
     def _ids(self, index: int) -> tuple[int, int]:
-        """Returns the range of the global ids of the tets of a part: first id, and last id plus 1."""
+        """Returns the range of the global ids of the tets of a part: its first id, and its last id plus 1."""
         ends = [*self._model.part_starts.tolist(), _LAST]
         return ends[index], ends[index + 1]
 

@@ -1,10 +1,10 @@
 """Unloading of cohesive facets that would release more energy in the next step than they absorbed.
 
-When the module is called, nodal forces are complete. Therefore the opening of a pair of nodes in the next step is
+When the unloading starts, the nodal forces are complete. Therefore the opening of a pair of nodes in the next step is
 known, except for the change by contact. Unloading of one facet changes the openings of the neighbouring facets.
-Therefore two passes over all facets are made; each pass uses the forces from before the pass. The first pass lowers the
-traction of each pair as far as this pair alone requires; the second pass completely unloads the pairs that still close
-too far.
+Therefore the module makes two passes over all facets. Each pass uses the forces that were present at its start. The
+first pass lowers the traction of each pair as far as this pair alone requires; the second pass completely unloads the
+pairs that still close too far.
 """
 
 import numpy as np
@@ -36,7 +36,7 @@ class Unloading:
         self._cohesion, self._nodes, self._neighbours, self._comm = cohesion, nodes, neighbours, comm
         self._shared: SharedSum | None = None
         self._room: Ints = np.zeros((0, 3), np.int64)
-        """(rows, 3) changes of the nodal forces in a pass, quanta; zero between passes."""
+        """(rows, 3) changes of the nodal forces in a pass, quanta. The array is zero between two passes."""
 
     def apply(self, clock: Clock) -> None:
         """Corrects the present nodal forces. Collective."""

@@ -1,4 +1,4 @@
-"""Update of all tables after facets broke: arrays by node, forces, cohesive facets and contact."""
+"""Update of all tables after facets broke: arrays by node, forces, cohesive facets, and contact."""
 
 from ..contact.stage import Contact
 from ..elements.forms import Elements
@@ -12,13 +12,13 @@ from .initiation import Initiation
 
 
 class TopologyUpdate:
-    """Tables of one rank that depend on the topology."""
+    """All tables of one rank that depend on the topology."""
 
     def __init__(
         self, model: Model, elements: Elements, initiation: Initiation, by_node: list[KeptByNode], handover: Handover,
         contact: Contact | None,
     ) -> None:  # fmt: skip
-        """``by_node``: objects with arrays by node, except the elements."""
+        """``by_node``: all objects that have arrays by node, except the elements."""
         self._model, self._elements, self._initiation, self._by_node = model, elements, initiation, by_node
         self._handover, self._contact = handover, contact
 

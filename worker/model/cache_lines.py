@@ -1,4 +1,4 @@
-"""Tables whose rows are cache lines, so that a kernel reads a row in one memory access."""
+"""Tables in which each row is a cache line, so that a kernel reads a row in one memory access."""
 
 import numpy as np
 

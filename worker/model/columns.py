@@ -1,8 +1,8 @@
-"""Columns of a growing table. The columns are arrays, with a row for each member of the table, and belong to objects of
-several stages.
+"""Columns of a growing table. A column is an array with one row for each member of the table. The columns belong to
+objects of several stages.
 
-A stage declares its columns once, with the values of new rows. Columns have spare rows: ``extend`` appends rows to all
-columns in one call of a kernel, without copying the columns.
+A stage declares its columns once, with a rule for the values of new rows. Columns have spare rows: ``extend`` appends
+rows to all columns in one call of a kernel, without copying the columns.
 """
 
 from enum import IntFlag
@@ -15,34 +15,34 @@ from .growing import spare
 
 
 class Rule(IntFlag):
-    """Rule for the values of the rows that are appended to a column."""
+    """Rule for the values of new rows of a column."""
 
     ZERO = 0
     """New rows have the value zero, or False."""
     ABSENT = 1
     """All bits of a new row are set; an integer is then -1."""
     COPIED = 2
-    """Flag of a rule. If the flag is set and the new row is a copy of another row, it has the values of that row."""
+    """Flag of a rule. If the flag is set, a new row that is a copy of another row has the values of that row."""
 
 
 ZERO, ABSENT, COPIED = Rule.ZERO, Rule.ABSENT, Rule.COPIED
 _WORDS, _ALL_BITS = 5, 255
 """Number of words that describe a column to the kernels: address, number of bytes, bytes of a row, value of each byte
-of a new row, and whether a copy has the row of its source. Then the value of a byte with all bits set."""
+of a new row, and flag for copied rows. The second constant is the value of a byte in which all bits are set."""
 
 
 class _Columns:
     """Columns that are attributes of one object. The object may be replaced by another object of the same type."""
 
     def __init__(self, owner: object, at: str, names: dict[str, int]) -> None:
-        """``at``: path from ``owner`` to the object with the attributes, "" for the owner itself; ``names``: number of
-        each column, keyed by name.
+        """``at``: path from ``owner`` to the object with the attributes, "" for the owner itself; ``names``: dictionary
+        from the names of the columns to their numbers.
         """
         self._owner, self._path, self.names = owner, at.split(".") if at else [], names
 
     @property
     def now(self) -> dict[str, Any]:
-        """The present attributes of the object; no attributes if the object does not exist."""
+        """Dictionary of the present attributes of the object; it is empty if the object does not exist."""
         holder: Any = self._owner
         for name in self._path:
             holder = getattr(holder, name)
@@ -56,11 +56,11 @@ class Columns:
     """All columns of one table."""
 
     def __init__(self) -> None:
-        """Create a table with no column."""
+        """Creates a table without columns."""
         self._objects: list[_Columns] = []
         self._rules: list[Rule] = []
         self._rooms: list[np.ndarray | None] = []
-        """Buffers of the columns, with spare rows. The buffer is None if the scene does not need the column."""
+        """Buffers of the columns, with spare rows. The entry of a column is None if the scene does not need it."""
         self._words = np.zeros((0, _WORDS), np.int64)
 
     def declare(self, owner: object, at: str = "", /, **rules: Rule) -> None:
@@ -78,8 +78,8 @@ class Columns:
             self._set(k, self._rooms[k])
 
     def extend(self, n: int, more: int) -> None:
-        """Appends ``more`` rows to the ``n`` rows of all columns, with the values of their rules."""
-        from .inheriting import fill  # late import of numba: the folder of its cache must be set first
+        """Appends ``more`` rows to the ``n`` rows of all columns. The values follow the rules of the columns."""
+        from .inheriting import fill  # numba is imported here, because the folder of its cache must be set first
 
         m, rooms = n + more, self._rooms
         for some in self._objects:
@@ -98,8 +98,8 @@ class Columns:
         fill(self._words, self._words.ctypes.data, n, more)
 
     def copy(self, sources: "npt.NDArray[Any]", targets: "npt.NDArray[Any]") -> None:
-        """Copies the COPIED columns of the rows ``sources`` (k,) to the rows ``targets`` (k,); the two arrays are
-        int64.
+        """Copies the rows ``sources`` (k,) to the rows ``targets`` (k,) in the columns with the rule COPIED. Both
+        arrays are int64.
         """
         from .inheriting import copy
 

@@ -1,4 +1,4 @@
-"""Buffers with spare capacity; they are used for arrays to which rows are appended, or that are filled again in every
+"""Buffers with spare capacity for arrays to which rows are appended, and for arrays that are filled again in every
 step.
 """
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Scratch:
-    """Buffers, keyed by name, of arrays that are filled again in every step.
+    """Buffers of arrays that are filled again in every step; each buffer has a name.
 
     An array keeps its address while its length does not change. Therefore a table of arguments (parallel/arguments.py)
     that contains the array stays valid.
@@ -61,7 +61,7 @@ def same_memory(one: np.ndarray, two: np.ndarray) -> bool:
 
 
 class Rooms:
-    """Buffers of some columns of a table; if a column has spare capacity, it is not copied when rows are appended."""
+    """Buffers of some columns of a table. A column with spare capacity is not copied when rows are appended."""
 
     def __init__(self, *names: str) -> None:
         """``names``: names of the attributes of the table that are columns."""

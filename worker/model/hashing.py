@@ -15,8 +15,8 @@ _GOLDEN = 0x9E3779B97F4A7C15
 
 
 def splitmix64(numbers: npt.NDArray[np.integer], seed: int) -> npt.NDArray[np.uint64]:
-    """Return the elements with the indices ``numbers`` (from 0) of the sequence that starts at ``seed``; an element has
-    64 random bits.
+    """Return the elements with the indices ``numbers`` (from 0) of the random sequence with the seed ``seed``. An
+    element has 64 random bits.
     """
     z = (np.asarray(numbers).astype(np.uint64) + np.uint64(1)) * np.uint64(_GOLDEN) + np.uint64(seed)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -25,5 +25,5 @@ def splitmix64(numbers: npt.NDArray[np.integer], seed: int) -> npt.NDArray[np.ui
 
 
 def uniform(numbers: npt.NDArray[np.integer], seed: int) -> Floats:
-    """Return a random float in [0, 1), a multiple of 2^-53, for each of ``numbers``."""
+    """Return one random float in [0, 1) for each index in ``numbers``. The float is a multiple of 2^-53."""
     return np.asarray((splitmix64(numbers, seed) >> np.uint64(11)) * 2.0**-53)

@@ -1,5 +1,5 @@
-"""Search for global ids in sorted lists. For many ids a table of all ids up to the largest id is used; for few ids,
-bisection.
+"""Search for global ids in sorted lists. If many ids are searched, the functions use a table of all ids up to the
+largest id; if few are searched, they use bisection.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ _Ids = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 _Places = npt.NDArray[np.int32]
 
 _BISECTION = 32
-"""Number of table entries that can be filled in the time of one bisection."""
+"""Number of table entries that a processor fills in the time of one bisection."""
 
 
 def located(known: _Ids, wanted: _Ids) -> _Places:
@@ -54,7 +54,7 @@ def unique(ids: _Ids) -> npt.NDArray[np.int64]:
 
 
 class IdIndex:
-    """Positions of ids in a list in any order."""
+    """Positions of ids in a list of any order."""
 
     def __init__(self, ids: _Ids) -> None:
         """``ids`` (n,): ids of the list, all different."""

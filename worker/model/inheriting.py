@@ -1,18 +1,18 @@
-"""Initial values of new rows of columns, and of new nodes that are copies of other nodes."""
+"""Kernels that set new rows of columns, and new nodes that are copies of other nodes."""
 
 from ..kernels.jit import njit, types
 from ..parallel.arguments import reader
 
 _WIDTH, _VALUE, _IS_COPIED, _SIZE = 2, 3, 4, 40
-"""Indices of the words that describe a column (columns.py): bytes of a row, value of each byte of a new row, whether a
-copy has the row of its source. Then the number of bytes of all words of a column."""
+"""Indices of the words that describe a column (columns.py): bytes of a row, value of each byte of a new row, and flag
+for copied rows. The last constant is the number of bytes of all words of a column."""
 _bytes = reader(types.uint8[::1])
 
 
 @njit("void(int64[:, ::1], int64, int64, int64)", cache=True)
 def fill(columns, words, n, more):  # type: ignore[no-untyped-def]
-    """Set ``more`` rows, from row ``n`` on, to the values of the rules; ``words``: address of the table ``columns`` (c,
-    5).
+    """Set ``more`` rows, from row ``n`` on, by the rules of the columns. ``words``: address of the table ``columns``
+    (c, 5).
     """
     for c in range(len(columns)):
         (room,) = _bytes(words + _SIZE * c)
@@ -42,7 +42,7 @@ def copy(columns, words, sources, targets):  # type: ignore[no-untyped-def]
 )
 def inherit(ids, owner, owned, mass, parents, new_ids, new_owner, new_owned, masses, n):  # type: ignore[no-untyped-def]
     """Set ids, owners and masses of the nodes from ``n`` on, which are copies of the nodes ``parents`` (k,). The mass
-    of a copy, ``masses`` (k,), kg, is subtracted from its parent.
+    of each copy, ``masses`` (k,), kg, is subtracted from the mass of its parent.
     """
     for c in range(len(parents)):
         ids[n + c], owner[n + c], owned[n + c] = new_ids[c], new_owner[c], new_owned[c]

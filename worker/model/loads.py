@@ -1,5 +1,5 @@
 """Loads on faces of tets: constant nodal forces, and faces under a pressure. Each rank selects its own loads from the
-lists.
+lists of the whole model.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class Load:
     """(m, 3) force on each node, N."""
 
     def take(self, chosen: Flags) -> "Load":
-        """Return the chosen forces."""
+        """Return the forces chosen by ``chosen``."""
         return Load(self.place[chosen], self.tets[chosen], self.nodes[chosen], self.force[chosen])
 
     def here(self, nodes: Ints, tets: Ints) -> "Load":
@@ -43,7 +43,7 @@ class LoadedFaces:
     """Number of quanta per newton of the nodal forces. All ranks have the same number."""
 
     def take(self, chosen: Flags) -> "LoadedFaces":
-        """Return the chosen faces."""
+        """Return the faces chosen by ``chosen``."""
         return LoadedFaces(self.tets[chosen], self.nodes[chosen], self.scale)
 
     def here(self, nodes: Ints, tets: Ints) -> "LoadedFaces":

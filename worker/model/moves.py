@@ -10,26 +10,26 @@ _Indices = npt.NDArray[np.int32]
 
 
 class Moves(NamedTuple):
-    """Removal of some tets of a block, for tables with a row for each tet of the block."""
+    """Removal of some tets of a block, for tables with one row for each tet of the block."""
 
     n: int
-    """Number of tets before."""
+    """Number of tets before the removal."""
     gone: _Ints
     """(g,) places of the removed tets, ascending."""
     holes: _Ints
-    """(k,) places below the new number of tets that are free."""
+    """(k,) free places that are filled by other tets."""
     movers: _Ints
-    """(k,) places of the tets that move to these places."""
+    """(k,) old places of the tets that fill these places."""
 
     @classmethod
     def of(cls, n: int, gone: _Ints) -> "Moves":
-        """Return the removal of the tets ``gone`` of ``n`` tets."""
+        """Return the removal of the tets ``gone`` from a block of ``n`` tets."""
         left = n - len(gone)
         return cls(n, gone, gone[gone < left], np.setdiff1d(np.arange(left, n), gone))
 
     @property
     def left(self) -> int:
-        """Number of tets afterwards."""
+        """Number of tets after the removal."""
         return self.n - len(self.gone)
 
     @property
@@ -41,8 +41,8 @@ class Moves(NamedTuple):
         return places
 
     def applied(self, table: "np.ndarray") -> "np.ndarray":
-        """Move the rows of a ``table`` (n, ...) in place; return its remaining rows. A table without rows stays as it
-        is.
+        """Move the rows of a ``table`` (n, ...) in place; return its remaining rows. A table without rows is not
+        changed.
         """
         if len(table):
             table[self.holes] = table[self.movers]

@@ -1,4 +1,4 @@
-"""Nodes with tets of several parts, and the mass that each part has in such a node; bonds by shared nodes make these
+"""Nodes with tets of several parts, and the mass of each part in such a node. Bonds by shared nodes create these
 nodes.
 """
 
@@ -31,12 +31,12 @@ class Shares:
     """(k,) mass that the node has from the tets of the part, kg."""
     rank: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     """(parts,) precedence of the parts as numbers, the smallest first; (0,) if no bond makes nodes of several parts.
-    Contact and other stages count a node for one part only, its representative part, which is the part of the node with
-    the smallest number."""
+    Contact and other stages assign a node to one part only, its representative part. This is the part of the node with
+    the smallest precedence number."""
 
     @property
     def fraction(self) -> Floats:
-        """Return (k,) the ratio of the mass of each row to the mass of its node."""
+        """Return (k,) the mass of each row divided by the mass of its node."""
         whole = np.bincount(self.node, self.mass, minlength=1)
         return np.asarray(self.mass / whole[self.node])
 
@@ -46,7 +46,7 @@ class Shares:
         return self.node.astype(np.int64) * MOST_PARTS + self.part
 
     def take(self, chosen: "np.ndarray") -> "Shares":
-        """Return the chosen rows."""
+        """Return the rows chosen by ``chosen``."""
         return Shares(self.node[chosen], self.part[chosen], self.mass[chosen], self.rank)
 
     def members(self, part: Indices) -> tuple[Ints, Indices]:
@@ -100,8 +100,8 @@ def shared(node: "np.ndarray", part: "np.ndarray", mass: Floats, rank: Ints) -> 
 
 
 def ranks(case: Case) -> Ints:
-    """Return (parts,) the numbers for ``Shares.rank``; (0,) in a case without nodes shared between parts. Parts that
-    are in contact have the smallest numbers.
+    """Return (parts,) the precedence numbers for ``Shares.rank``; (0,) in a case without nodes shared between parts.
+    Parts that are in contact have the smallest numbers.
     """
     if not shared_bonds(case):
         return np.zeros(0, np.int64)

@@ -1,9 +1,9 @@
 """Arrays of a rank: nodes, and blocks of elements in chunks.
 
-A block holds the elements of one part. The state of the tets is stored chunk by chunk, ``(chunks, rows, CHUNK)``: the
-rows of a chunk are contiguous, at offsets known at compile time, so that loops over a chunk use vector instructions and
-the whole state of a chunk fits in the first cache levels. All values are in SI units. Stress is positive in tension,
-pressure is positive in compression.
+A block contains the elements of one part. The state of the tets is stored chunk by chunk, ``(chunks, rows, CHUNK)``:
+the rows of a chunk are contiguous, at offsets known at compile time, so that loops over a chunk use vector instructions
+and the whole state of a chunk fits in the first cache levels. All values are in SI units. Stress is positive in
+tension, pressure is positive in compression.
 """
 
 from dataclasses import dataclass, field
@@ -25,12 +25,12 @@ Tets = npt.NDArray[np.uint32]
 """Type of local node indices of tets. The type is unsigned, so that numba omits the test for negative indices."""
 
 CHUNK = 376
-"""Number of elements in a chunk."""
+"""Number of elements in one chunk."""
 
 INTACT, BROKEN, WIDE = range(3)
 """States of a facet between two tets: intact; broken; broken and so wide open that its two sides are surface."""
 _OF_TETS = "tets", "id", "across", "bond", "weakest", "hot", "worn", "group", "flat", "own_averages"
-"""Attributes of a block that are tables with a row for each tet, or have no rows."""
+"""Names of the attributes of a block that are tables. Each table has one row for each tet, or has no rows."""
 LAID_BARE = -2
 """Value of ``Block.across`` for a face that erosion has exposed. A face that was exposed at the start has -1."""
 
@@ -58,9 +58,9 @@ class Nodes:
     part: Indices
     """(n,) index of the part of each node; for a node of several parts (``shares``) it is the representative part."""
     owner: Indices
-    """(n,) rank that owns each node. Sums over nodes count a node only on the rank that owns it."""
+    """(n,) rank that owns each node. A sum over nodes includes a node only on the rank that owns the node."""
     owned: npt.NDArray[np.bool_]
-    """(n,) whether this rank owns the node."""
+    """(n,) True if this rank owns the node."""
     x0: Floats
     """(n, 3) initial position, m."""
     x: Floats
@@ -72,19 +72,19 @@ class Nodes:
     force: Ints
     """(n, 3) internal force, quanta."""
     stepping: Floats
-    """(n,) energy that each node lost by changes of the step length, J (accounts/energy.py)."""
+    """(n,) energy that each node has lost by unequal time steps, J (accounts/energy.py)."""
     scale: float = 1.0
-    """Quanta per newton of ``force``."""
+    """Number of quanta per newton in ``force``."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
-    """(n,) group of tets to which each node belongs (Model.groups); (0,) if loads of groups are not recorded. A copy
-    has the group of its parent."""
+    """(n,) group of tets to which each node belongs (Model.groups); (0,) if loads of groups are not recorded. A copy of
+    a node has the group of its parent."""
     marks: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(n,) sets of mesh files that contain each node, as bits (scene/marks.py); (0,) if the case refers to no set. A
-    copy has the bits of its parent."""
+    """(n,) sets of mesh files that contain each node, one bit for each set (scene/marks.py); (0,) if the case refers to
+    no set. A copy of a node is in the same sets as its parent."""
     shares: Shares = field(default_factory=Shares)
-    """Masses that each part has in the nodes that belong to several parts."""
+    """Masses of the parts in the nodes that belong to several parts."""
     columns: Columns = field(default_factory=Columns, init=False, repr=False, compare=False)
-    """Columns, by node, of all stages; a stage declares its columns when it is built."""
+    """Columns of all stages that have one row for each node. A stage declares its columns when it is built."""
 
     def __post_init__(self) -> None:
         """Declares the columns of this table."""
@@ -101,13 +101,13 @@ class Nodes:
         return ids_of.places(self.id, ids)
 
     def among(self, chosen: Flags) -> Flags:
-        """Return (n,) whether each node has a tet of one of the ``chosen`` parts (parts,)."""
+        """Return (n,) flags: True if a tet of a ``chosen`` part (parts,) is at the node."""
         found: Flags = chosen[self.part]
         found[self.shares.node[chosen[self.shares.part]]] = True
         return found
 
     def in_part(self, part: int) -> Flags:
-        """Return (n,) whether each node has a tet of the part."""
+        """Return (n,) flags: True if a tet of the part is at the node."""
         found: Flags = self.part == part
         found[self.shares.node[self.shares.part == part]] = True
         return found
@@ -149,7 +149,7 @@ class Copies:
     owner: Indices
     """(n,) rank that owns the copy."""
     owned: Flags
-    """(n,) whether this rank owns the copy."""
+    """(n,) True if this rank owns the copy."""
     mass: Floats
     """(n,) mass of the copy, kg."""
 
@@ -181,7 +181,7 @@ class Block:
     """Material constants (materials/models.py)."""
     border_chunks: int = 0
     temperature: float = 293.15
-    """Initial temperature, K. If the material has no row for the temperature, it is the temperature of every tet."""
+    """Initial temperature, K. It is the temperature of every tet if the material has no row for the temperature."""
     across: Indices = field(default_factory=lambda: np.zeros((0, 4), np.int32))
     """(n, 4) the neighbour of each face at the start, 4 * global tet id + local face; the value is -1 for a face
     exposed at the start, and LAID_BARE for a face exposed by erosion. (0, 4) in scenes without contact and fracture."""
@@ -190,18 +190,18 @@ class Block:
     weakest: Floats = field(default_factory=lambda: np.zeros(0))
     """(n,) smallest strength of the four faces of each tet, Pa; (0,) if the part does not fracture."""
     hot: Bits = field(default_factory=lambda: np.zeros(0, np.uint8))
-    """(n,) marks of overstressed faces: bit k is set if the traction on face k, by the stress of the tet alone, exceeds
-    ``weakest``."""
+    """(n,) marks of overstressed faces: bit k is set if the traction on face k, from the stress of the tet alone,
+    exceeds ``weakest``."""
     flat: Flags = field(default_factory=lambda: np.zeros(0, bool))
-    """(n,) whether each tet is flat (elements/flat.py); (0,) if no tet is flat. Their strains are not averaged."""
+    """(n,) True for each flat tet, whose strains are not averaged (elements/flat.py); (0,) if no tet is flat."""
     shear_weight: float = 0.0
     """Weight of the shear traction relative to the normal traction in the fracture criterion."""
     worn: Flags = field(default_factory=lambda: np.zeros(0, bool))
-    """(n,) whether erosion will remove each tet; (0,) if the part does not erode."""
+    """(n,) True for each tet that erosion will remove; (0,) if the part does not erode."""
     life: Floats = field(default_factory=lambda: np.zeros(5))
     """Limits beyond which erosion removes a tet (elements/wear.py)."""
     rigid: bool = False
-    """Whether the part is rigid. Passes over elements omit a rigid part."""
+    """True if the part is rigid. Passes over elements omit a rigid part."""
     seconds: float = 0.0
     """CPU time of the passes over the block, s; it is measured only if the rank has several blocks."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
@@ -224,7 +224,7 @@ class Block:
         return -(-self.n // CHUNK)
 
     def __post_init__(self) -> None:
-        """Sets views of ``state``. The array object ``state`` is never replaced."""
+        """Creates the views of ``state``. The array object ``state`` is never replaced."""
         self.flat_state: Floats = self.state.reshape(-1)
         """View of the state of all tets as a flat array."""
         self.rows = int(self.state.shape[1])
@@ -236,7 +236,7 @@ class Block:
 
     def at(self, row: int, places: "np.ndarray") -> Floats:
         """Return (k,) a copy of the state row ``row`` of the tets ``places`` (k,)."""
-        further = (int(self.state.shape[1]) - 1) * CHUNK  # words from chunk to chunk of a row
+        further = (int(self.state.shape[1]) - 1) * CHUNK  # words between two parts of the row
         return np.asarray(self.state.reshape(-1)[places + (places // CHUNK * further + row * CHUNK)])
 
     def has(self, row: int) -> bool:
@@ -244,7 +244,7 @@ class Block:
         return row < self.rows
 
     def exposed(self) -> Flags:
-        """Return (n, 4) whether each face is part of the surface."""
+        """Return (n, 4) flags: True for each face that is part of the surface."""
         bare: Flags = self.across < 0
         return bare | (self.bond == WIDE) if len(self.bond) else bare
 
@@ -290,7 +290,7 @@ class Model:
 
 
 def chunked(values: Floats) -> Floats:
-    """Return (n,) values in the shape (chunks, CHUNK); the last value, a safe divisor, pads the last chunk."""
+    """Return (n,) values in the shape (chunks, CHUNK). The last value fills the rest of the last chunk."""
     chunks = -(-len(values) // CHUNK)
     filled = np.empty(chunks * CHUNK)
     filled[: len(values)] = values

@@ -21,10 +21,12 @@ def keys(nodes: Ints, tets: Ints) -> Ints:
 
 
 class KeptByNode(Protocol):
-    """An object with arrays by node. The arrays are extended when nodes separate."""
+    """Interface of an object with arrays that have one row for each node. The arrays are extended when nodes
+    separate.
+    """
 
     def grow(self, split: "Split", ids: Ints) -> None:
-        """Extend the arrays by node by the copies of a separation; ``ids``: global ids of the local nodes."""
+        """Append the copies of a separation to the arrays by node. ``ids``: global ids of the local nodes."""
 
 
 @dataclass
@@ -38,9 +40,9 @@ class Split:
     first: int
     """Local index of the first copy."""
     touched: Ints
-    """(ranks,) not zero for ranks that have a node of a breaking facet."""
+    """(ranks,) not zero for each rank that has a node of a breaking facet."""
     key: Ints
-    """(r,) global ids of node and tet of each row, combined into one integer (``keys``); ascending."""
+    """(r,) global ids of the node and the tet of each row, combined into one integer (``keys``); ascending."""
     node: Indices
     """(r,) local index of the copy that replaces the node of each row."""
     place: Indices

@@ -23,7 +23,7 @@ from ..stage import Contact
 from .inside import outermost
 
 LARGE = 0.1
-"""Largest fraction of the volume of a tet that may lie in other tets; a tet with a larger fraction is counted. Chosen
+"""Largest fraction of the volume of a tet that may lie in other tets. A tet with a larger fraction is counted. Chosen
 value: where curved bodies of flat facets touch, their tets have about a hundredth of the volume in common."""
 _SHARED, _MOST = 0.01, 0.5
 """Limits of the warning: ratio of the common volume to the volume of all tested tets, and largest ratio of the common
@@ -33,8 +33,8 @@ _WORDS = 19
 """Number of words of a tet in a message: its id, its fragment, its part, the ids of its nodes, and the words of their
 positions."""
 _QUANTUM = 2.0**-40
-"""Quantum of the common volumes of a tet, divided by its volume. Sums of quanta do not depend on the order of
-summation."""
+"""Quantum in which the common volumes of a tet are summed, divided by the volume of the tet. Sums of quanta do not
+depend on the order of summation."""
 _PIECES = 81
 """Largest number of pieces of a tet after four cuts by planes. Each cut divides a piece into at most three pieces."""
 
@@ -153,8 +153,8 @@ def _determinant(tet):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[:, :], int64, float64[:, :], int64)", cache=True)
 def _height(tet, face, other, k):  # type: ignore[no-untyped-def]
-    """Returns ``_triple`` of corner ``k`` of ``other`` and the face opposite to a corner of a tet; the value is
-    positive on the inner side of the face.
+    """Returns the result of ``_triple`` for corner ``k`` of the tet ``other`` and the face of a tet that is opposite to
+    one of its corners. The value is positive on the inner side of the face.
     """
     return -_triple(tet, FACES[face, 0], FACES[face, 1], FACES[face, 2], other, k)
 
@@ -224,8 +224,8 @@ def _in_front(out, n, tet, height, wedge, order):  # type: ignore[no-untyped-def
 
 @njit("float64(float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1])", cache=True)
 def intersection(pieces, others, one, other):  # type: ignore[no-untyped-def]
-    """Six times the common volume, m^3, of two tets (4, 3), neither of which is inverted; the first tet is cut by the
-    face planes of the second tet, one after the other. ``pieces``, ``others`` (_PIECES, 4, 3): working arrays.
+    """Six times the common volume, m^3, of two tets (4, 3). Neither tet is inverted. The first tet is cut by the face
+    planes of the second tet, one after the other. ``pieces``, ``others`` (_PIECES, 4, 3): working arrays.
     """
     n, height, wedge, order = 1, np.empty(4), np.empty((6, 3)), np.empty(4, np.int64)
     pieces[0] = one
@@ -248,9 +248,9 @@ def intersection(pieces, others, one, other):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _cut(quanta, pairs, ids, ones, other_ids, others):  # type: ignore[no-untyped-def]
-    """Adds the fraction of each of the tets ``ones`` (n, 4, 3) that is inside of ``others`` (m, 4, 3) to ``quanta``
-    (n,), for the pairs (p, 2) without a common node. ``ids`` (n, 4), ``other_ids`` (m, 4): ids of the nodes of the
-    tets.
+    """Adds to ``quanta`` (n,) the fraction of each tet of ``ones`` (n, 4, 3) that is inside of tets of ``others`` (m,
+    4, 3). Only the pairs (p, 2) without a common node are used. ``ids`` (n, 4), ``other_ids`` (m, 4): global ids of the
+    nodes of the tets.
     """
     pieces, next_pieces = np.empty((_PIECES, 4, 3)), np.empty((_PIECES, 4, 3))
     for p in range(len(pairs)):

@@ -3,12 +3,12 @@ Nodes inside of their own part are counted even if the part has no contact with 
 
 A node in a tet of another fragment has passed through the surface of that fragment. The depth of the node is computed
 from the tet alone; it is the depth below the nearest exposed face of the tet. If the tet has no exposed face but a
-corner on the surface, it is the depth below the nearest of all its faces. The depth is at most the distance from a
-corner on the surface. In a tet without a corner on the surface the node is deeper than the outermost layer of tets. If
-that layer was compressed to nearly zero thickness, the nearest exposed faces of the body determine the depth. A node on
-an edge between two corners on the surface counts as touching, because a tet with an edge on the surface may have no
-exposed face there; such edges may run through a plate that is one tet thick. Nodes of the surface and separated nodes
-are tested against the tets of all ranks, so that the result does not depend on the partition.
+corner on the surface, the depth is that below the nearest of all its faces. The depth is at most the distance of the
+node from a corner on the surface. In a tet without a corner on the surface the node is deeper than the outermost layer
+of tets. If that layer was compressed to nearly zero thickness, the nearest exposed faces of the body determine the
+depth. A node on an edge between two corners on the surface counts as touching, because a tet with an edge on the
+surface may have no exposed face there; such edges may run through a plate that is one tet thick. Nodes of the surface
+and separated nodes are tested against the tets of all ranks, so that the result does not depend on the partition.
 """
 
 from dataclasses import dataclass
@@ -26,8 +26,8 @@ from ..stage import Contact
 from .overlap import to_borders
 
 SLIGHT = 0.05
-"""Ratio of the depth to the typical size of a face; depths below this ratio count as 0. The chosen value is above the
-residual of the contact sweeps."""
+"""Ratio of the depth of a node to the typical size of a face. Depths below this ratio count as 0. Chosen value: it is
+above the residual of the contact sweeps."""
 _WORDS = 5
 """Number of words of a node in a message."""
 _AT_ONCE = 1 << 14
@@ -36,8 +36,8 @@ _ROUNDING = 1e-9
 """Tolerance of the volume coordinates; within this tolerance a node on the face between two tets counts as being in
 each of them."""
 DEEP = 0.25
-"""Ratio of the depth to the typical size of a face, above which a warning is given; chosen value: about half of the
-altitude of a regular tet."""
+"""Ratio of the depth of a node to the typical size of a face, above which the run gives a warning. Chosen value: about
+half of the altitude of a regular tet."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Inside:
     """Number of nodes that are deeper than SLIGHT inside of another body or fragment; nodes without tets are also
     counted if they are inside of their own part."""
     own: int
-    """Number of penetrated nodes that have no tets and are inside of their own part only."""
+    """Number of penetrated nodes that have no tets and are inside of their own part, but not of another part."""
     buried: int
     """Number of penetrated nodes that lie in a tet without a corner on the surface, and are further than SLIGHT from
     any exposed face of the body of that tet."""
@@ -74,7 +74,7 @@ class Inside:
 
 
 def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) -> Inside:
-    """Finds the nodes inside of other bodies, at the present positions. Collective.
+    """Finds the nodes that are inside of other bodies at the present positions. Collective.
 
     ``labels``: fragment of each tet, one array (n,) for each block; None if every part is one fragment.
     """
@@ -114,8 +114,8 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
 
 
 def _may(contact: Contact) -> Flags:
-    """(parts, parts) pairs of parts that are tested; these are the pairs that may be in contact, and each part of such
-    a pair with its own nodes without tets.
+    """(parts, parts) True for each pair of parts that is tested. These are the pairs that may be in contact, and each
+    part of such a pair with its own nodes without tets.
     """
     meet = ~np.isnan(contact.searches.mu)
     return np.asarray(meet | (np.eye(len(meet), dtype=bool) & meet.any(axis=1)))
@@ -146,7 +146,7 @@ def _seen(outer: Flags, model: Model, fragments: list[Ints], comm: Comm) -> _See
 
 
 def outermost(contact: Contact) -> Flags:
-    """(nodes,) whether each node is on the surface or has separated."""
+    """(nodes,) True for each node that is on the surface or has separated."""
     ring = contact.exterior.cracks.families.ring
     return np.asarray(contact.exterior.surface.flags | (ring != np.arange(len(ring))))
 
@@ -154,8 +154,8 @@ def outermost(contact: Contact) -> Flags:
 def _at_surface(
     x: Floats, parts: Indices, of: Ints, contact: Contact, model: Model, fragments: list[Ints]
 ) -> Ints:  # fmt: skip
-    """(p,) number of open faces of this rank that belong to the fragments ``of`` (p,) and are within SLIGHT of the
-    points ``x`` (p, 3).
+    """(p,) number of open faces of this rank near each point. Faces are counted if they belong to the fragment ``of``
+    (p,) of the point and are within SLIGHT of the point ``x`` (p, 3).
     """
     if not len(x):
         return np.zeros(0, np.int64)
@@ -175,7 +175,7 @@ def _at_surface(
 
 
 def _exposed(block: Block, contact: Contact) -> Flags:
-    """(n, 4) whether each face of a tet is exposed or broken. Faces in symmetry planes are not exposed."""
+    """(n, 4) True for each face of a tet that is exposed or broken. Faces in symmetry planes are not exposed."""
     faces = contact.exterior.surface.faces
     opened = np.isin(4 * block.id[:, None] + np.arange(4), faces.id[faces.exposed])
     if len(block.bond):
@@ -184,8 +184,8 @@ def _exposed(block: Block, contact: Contact) -> Flags:
 
 
 def _open(block: Block, contact: Contact, outer: Flags) -> Flags:
-    """(n, 4) whether each face of a tet is used for depths; these are the faces that are ``_exposed``; in a tet without
-    such a face but with a corner on the surface, all faces are used."""
+    """(n, 4) True for each face of a tet that is used for depths. These are the faces that are ``_exposed``. In a tet
+    that has no such face but a corner on the surface, all faces are used."""
     opened = _exposed(block, contact)
     touching = np.asarray(outer[block.tets].any(axis=1))
     return np.asarray(opened | (touching & ~opened.any(axis=1))[:, None])
@@ -193,8 +193,8 @@ def _open(block: Block, contact: Contact, outer: Flags) -> Flags:
 
 def _depths(points: Floats, corners: Floats, opened: Flags, outer: Flags) -> Floats:
     """(p,) depth of points (p, 3) in tets (p, 4, 3), m. The depth is the distance from the nearest ``opened`` face (p,
-    4) or from the nearest corner on the surface, ``outer`` (p, 4); it is infinite if the tet has neither; it is
-    negative outside of the tet and in a tet without volume.
+    4) or from the nearest corner on the surface, ``outer`` (p, 4). If the tet has neither, the depth is infinite. The
+    depth is negative outside of the tet and in a tet without volume.
     """
     edges = corners[:, 1:] - corners[:, :1]
     solid = np.linalg.det(edges) > 0.0

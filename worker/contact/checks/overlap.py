@@ -1,5 +1,5 @@
-"""Overlap of bodies before the first step. The module finds place and depth of an overlap and can remove the overlap by
-moving nodes; if an overlap remains, it reports an error.
+"""Overlap of bodies before the first step. The module finds place and depth of an overlap, and can remove the overlap
+by moving nodes. If an overlap remains, the module reports an error.
 """
 
 from collections.abc import Iterator
@@ -15,9 +15,9 @@ from ..broad_phase.boxes import Primitives
 from ..narrow_phase.facing import FACING
 
 _INSIDE = 1e-9
-"""Tolerance of the volume coordinates for a node inside of a tet."""
+"""Tolerance of the volume coordinates, for the test whether a node is inside of a tet."""
 _ROUNDING = 1e-6
-"""Ratio of the depth to the size of a face; depths below this ratio count as 0."""
+"""Ratio of the depth of a node to the size of a face. Depths below this ratio count as 0."""
 _TRIES = 30
 """Largest number of passes in which overlapping bodies are moved apart. Chosen value."""
 
@@ -57,8 +57,8 @@ class Overlaps:
 
 
 def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Overlaps:
-    """Finds surface nodes that are inside of the tets (k, 4) of another part; the two parts must be ``allowed`` to be
-    in contact. ``points`` (n, 3), m.
+    """Finds surface nodes that are inside of the tets (k, 4) of another part. The two parts must be ``allowed`` to be
+    in contact. ``points`` (n, 3): positions, m.
     """
     others = allowed & ~np.eye(len(allowed), dtype=bool)
     nodes = np.unique(surface.faces).astype(np.int32)
@@ -125,8 +125,8 @@ def nested(points: Floats, tets: Indices, part: Indices, surface: Surface, allow
 
 
 def within(points: Floats, tets: Indices, body: Indices) -> tuple[Indices, Indices]:
-    """Nodes that are inside of another body, and tets whose centre is inside of another body; ``body`` (n,): body of
-    each node.
+    """Returns the nodes that are inside of another body, and the tets whose centre is inside of another body. ``body``
+    (n,): body of each node.
 
     A node on the surface of a body is not inside of the body. A node on a face between two tets of a body is inside of
     the body: if two meshes of one grid are shifted by half a cell, all nodes lie on such faces. A centre is inside of
@@ -188,11 +188,11 @@ def _shares(nodes: Floats, corners: Floats) -> Floats:
 
 
 def _faced(outward: Floats, inward: Floats) -> Flags:
-    """(p, 4) whether a node with the outward direction ``outward`` (p, 3) may lie on each face. The faces are given by
-    their normals into the tets (p, 4, 3).
+    """(p, 4) True for each face if a node with the outward direction ``outward`` (p, 3) may lie on it. The faces are
+    given by their normals into the tets (p, 4, 3).
 
     If sides of two bodies lie in one plane and one body penetrates the other, a rim node of the first body is on that
-    side of the second body, but this side does not support the node.
+    side of the second body. In this case the side does not support the node.
     """
     return np.asarray((inward * outward[:, None]).sum(axis=2) >= -FACING)
 
@@ -205,7 +205,7 @@ def _inward(corners: Floats) -> Floats:
 
 
 def _clear(normals: Floats, ways: Floats) -> Flags:
-    """(f,) whether a node lies on each plane, because no tet of the node reaches behind the plane. The planes go
+    """(f,) True for each plane if a node lies on it, because no tet of the node reaches behind the plane. The planes go
     through the node and have the unit ``normals`` (f, 3); ``ways`` (w, 3): vectors from the node to the corners of its
     tets. The test holds for any mean normal of the node; it is needed because a corner at the rim of two slanted sides
     may face neither side.
@@ -233,9 +233,10 @@ def _normals(points: Floats, faces: Indices) -> Floats:
 
 
 def _nearest(node: Floats, outward: Floats, ways: Floats, triangles: Floats) -> tuple[float, Floats]:
-    """Returns the depth of a node below the nearest triangle that it faces, m, and the unit normal of this triangle.
-    ``triangles`` (f, 3, 3). A node faces a triangle because of its mean normal, or because no tet of the node reaches
-    behind the plane of the triangle; ``ways`` (w, 3): vectors to the corners of these tets.
+    """Returns the depth of a node below the nearest triangle that the node faces, m, and the unit normal of this
+    triangle. ``triangles`` (f, 3, 3): corners of the triangles. A node faces a triangle because of its mean normal, or
+    because no tet of the node reaches behind the plane of the triangle; ``ways`` (w, 3): vectors to the corners of
+    these tets.
 
     The depth is zero for a node on the surface, and if the foot of the node is on no faced triangle. In a dent of the
     surface the nearest triangle may be wrong: a ridge may be nearest, with the foot on its far side.

@@ -38,7 +38,7 @@ class OwnSlots:
         return own
 
     def add(self, first: int, rows: SurfaceNodes) -> None:
-        """Adds the slots of the nodes ``rows``. The new slots have numbers from ``first`` on."""
+        """Adds the slots of the nodes ``rows``. The numbers of the new slots start at ``first``."""
         held = np.flatnonzero(rows.local >= 0)
         slots, local = (first + held).astype(np.int32), rows.local[held]
         self._rooms.append(self, len(held), slots=slots, local=local)
@@ -55,7 +55,7 @@ SLOT_COLUMNS = {
     **dict.fromkeys(("normals", "owned", "on_surface", "pushes", "live", "new", "tracked"), COPIED),
     "root": ABSENT | COPIED, "first": ABSENT, "fresh": ZERO, "total": ZERO, "before": ZERO,
 }  # fmt: skip
-"""Rules of the columns of SceneSlots (model/columns.py)."""
+"""Rules for new rows of the columns of SceneSlots (model/columns.py)."""
 
 
 @dataclass
@@ -63,38 +63,38 @@ class SceneSlots:
     """Columns with one value for each slot."""
 
     owned: Flags
-    """(slots,) whether each node is a surface node that this rank owns; this rank computes the contacts of such nodes
-    with faces."""
+    """(slots,) True for each surface node that this rank owns. This rank computes the contacts of such nodes with
+    faces."""
     pushes: Flags
-    """(slots,) whether a contact of this rank may apply an impulse to each node."""
+    """(slots,) True for each node to which a contact of this rank may apply an impulse."""
     live: Flags
-    """(slots,) whether each node is owned by this rank and is in the broad phase."""
+    """(slots,) True for each node that this rank owns and that is in the broad phase."""
     new: Flags
-    """(slots,) whether the candidate pairs of each node must be searched again (registration)."""
+    """(slots,) True for each node whose candidate pairs must be searched again (registration)."""
     fresh: Flags
-    """(slots,) whether the pairs of each node must be tested because its mean normals have changed."""
+    """(slots,) True for each node whose pairs must be tested because its mean normals have changed."""
     tracked: Flags
-    """(slots,) whether the motion of each node is measured; it is measured for nodes in the broad phase, and for nodes
-    of faces and edges in the broad phase."""
+    """(slots,) True for each node whose motion is measured. These are nodes in the broad phase, and nodes of faces and
+    edges in the broad phase."""
     on_surface: Flags
-    """(slots,) whether each node is a local node on the surface; only these nodes are in contact with faces."""
+    """(slots,) True for each local node on the surface. Only these nodes are in contact with faces."""
     first: Indices
-    """(slots,) first pair of each slot with a face, -1 for none."""
+    """(slots,) index of the first pair of each slot with a face; -1 if the slot has no such pair."""
     root: Indices
-    """(slots,) slot at the last search of which each slot is a copy; for a slot that is no copy, the slot itself; -1
-    for a slot that was added after the search."""
+    """(slots,) slot at the last search from which each slot was copied. For a slot that is not a copy it is the slot
+    itself; for a slot that was added after the search it is -1."""
     normals: Floats
     """(slots, COLUMNS) mean normals of each node; see tables.SlotTable."""
     total: Ints
     """(slots, 3) impulses of the last step on each node, quanta."""
     before: Floats
-    """(slots, 3) v(n-1/2), m/s."""
+    """(slots, 3) velocity v(n-1/2) of each node, m/s."""
     columns: Columns = field(default_factory=Columns, init=False, repr=False)
     """All columns of the scene with one value for each slot."""
 
     @classmethod
     def at_rest(cls, owned: Flags, pushes: Flags) -> "SceneSlots":
-        """Returns the columns for the start of a scene, when no row is in the broad phase."""
+        """Returns the columns for the start of a scene, when no node is in the broad phase."""
         n = len(owned)
         live, new, fresh, tracked, on_surface = np.zeros((5, n), bool)
         first, root = np.full(n, -1, np.int32), np.arange(n, dtype=np.int32)
@@ -114,24 +114,24 @@ class SceneFaces:
     """(f,) global ids of the faces, ascending."""
     size: Floats
     exposed: Flags
-    """(f,) whether each face is exposed; only exposed faces have contacts."""
+    """(f,) True for each exposed face; only exposed faces have contacts."""
     live: Flags
-    """(f,) whether each face is in the broad phase. Exposed faces are in the broad phase, and faces that may be exposed
+    """(f,) True for each face in the broad phase. These are the exposed faces, and the faces that may be exposed
     soon."""
     new: Flags
-    """(f,) whether the candidate pairs of each face must be searched again (registration)."""
+    """(f,) True for each face whose candidate pairs must be searched again (registration)."""
     fresh: Flags
-    """(f,) whether the pairs of each face must be tested, because a corner is new or the face is newly exposed."""
+    """(f,) True for each face whose pairs must be tested, because a corner is new or the face is newly exposed."""
 
     @classmethod
     def at_rest(cls, corners: Indices, ids: Ints, size: Floats, exposed: Flags) -> "SceneFaces":
-        """Returns the columns for the start of a scene, when no row is in the broad phase."""
+        """Returns the columns for the start of a scene, when no face is in the broad phase."""
         return cls(corners, ids, size, exposed, *np.zeros((3, len(corners)), bool))
 
     @cached_property
     def incidence(self) -> Incidence:
-        """Rows of the table at each slot of the last search; the first call must be made before any corner has become a
-        copy.
+        """Rows of the table at each slot of the last search. The first call must be made before any corner has been
+        replaced by a copy.
         """
         return Incidence(self.corners)
 
@@ -151,26 +151,26 @@ class SceneEdges:
     opened: Bits
     """(e, 2) states of the two faces of each edge; see records.Edges."""
     meets: Flags
-    """(e,) whether the states of the two faces of each edge admit edge-edge contact; see records.Edges."""
+    """(e,) True for each edge if the states of its two faces admit edge-edge contact; see records.Edges."""
     sharp: Flags
-    """(e,) whether each edge is sharp or has been sharp (sharp.py)."""
+    """(e,) True for each edge that is sharp or has been sharp (sharp.py)."""
     own: Flags
-    """(e,) whether the face of smaller id of each edge is on this rank."""
+    """(e,) True for each edge whose face of smaller id is on this rank."""
     rank: Ints
-    """(e,) order of the edges. A pair belongs to its edge of lower rank."""
+    """(e,) rank of each edge in an order of all edges. A pair of edges belongs to its edge of lower rank."""
     live: Flags
-    """(e,) whether each edge is in the broad phase."""
+    """(e,) True for each edge in the broad phase."""
     new: Flags
-    """(e,) whether the candidate pairs of each edge must be searched again (registration)."""
+    """(e,) True for each edge whose candidate pairs must be searched again (registration)."""
     fresh: Flags
-    """(e,) whether the pairs of each edge must be tested."""
+    """(e,) True for each edge whose pairs must be tested."""
 
     @classmethod
     def at_rest(
         cls, corners: Indices, sides: Ints, faces: Indices, lengths: Floats, opened: Bits, sharp: Flags, own: Flags,
         rank: Ints,
     ) -> "SceneEdges":  # fmt: skip
-        """Returns the columns for the start of a scene, when no row is in the broad phase."""
+        """Returns the columns for the start of a scene, when no edge is in the broad phase."""
         one, two = opened.T
         meets = np.asarray((np.minimum(one, two) >= AGED) & (np.maximum(one, two) == OPEN))
         return cls(
@@ -194,14 +194,14 @@ class SceneEdges:
 
     @cached_property
     def incidence(self) -> Incidence:
-        """Rows of the table at each slot of the last search; the first call must be made before any corner has become a
-        copy.
+        """Rows of the table at each slot of the last search. The first call must be made before any corner has been
+        replaced by a copy.
         """
         return Incidence(self.corners)
 
     @property
     def names(self) -> Ints:
-        """(e,) ids of the two faces of each edge, combined into one number; the number identifies the edge, because two
+        """(e,) ids of the two faces of each edge, combined into one number. The number identifies the edge, because two
         faces have at most one edge in common.
         """
         return (self.sides[:, 0] << 32) + self.sides[:, 1]

@@ -13,10 +13,10 @@ from ...parallel.tags import Tag
 from ..surface.records import Edges, Faces, SurfaceNodes
 
 _CROWD_WORDS = 15
-"""Number of words for a node in a message (``pack``)."""
+"""Number of words for one node in a message (``pack``)."""
 _ROOM = 32
-"""Number of rows by which the message of a rank is enlarged, so that separated nodes rarely require a new message;
-chosen value: 2 kB."""
+"""Number of rows by which the message of a rank is enlarged, so that separated nodes rarely require a new message.
+Chosen value: this is 2 kB."""
 
 
 def pack(faces: Faces, edges: Edges, surface_nodes: SurfaceNodes) -> Ints:
@@ -60,8 +60,8 @@ def unpack_nodes(words: Ints) -> SurfaceNodes:
 
 
 def fetch(ids: Ints, owners: Indices, held: SurfaceNodes, comm: Comm) -> SurfaceNodes:
-    """Receives the data of nodes that are not on this rank from the owners of these nodes. ``ids``, ``owners``: ids and
-    owners of the nodes; ``held``: all local nodes. Collective.
+    """Receives the data of nodes that are not on this rank from the owners of these nodes. ``ids``, ``owners``: global
+    ids and owner ranks of the nodes; ``held``: all local nodes. Collective.
     """
     asked = comm.swap({rank: ids[owners == rank] for rank in ranks(owners)})
     answers = comm.swap({rank: pack_nodes(held.take(held.places(want))) for rank, want in asked.items()})
@@ -97,18 +97,18 @@ def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes,
 
 
 def _begins(values: Ints) -> Flags:
-    """(n,) whether each element is the first of equal elements; ``values`` is ascending."""
+    """(n,) True for each element that is the first one among equal elements; ``values`` is ascending."""
     return np.concatenate([np.ones(min(len(values), 1), bool), values[1:] != values[:-1]])
 
 
 def _rows(ids: Ints, rank: int, comm: Comm) -> Ints:
-    """Returns node and rank, combined into one number."""
+    """Returns node and rank of each row, combined into one number."""
     return ids * comm.size + rank
 
 
 def _company(node: Ints, holder: Ints, group: Ints, member: int) -> Ints:
-    """Returns rows (node, rank that has it) for the nodes of the rank ``member``, without the rows of that rank itself.
-    ``group`` (n,): number of the node of each row.
+    """Returns rows (node, rank that has the node) for the nodes of the rank ``member``, without the rows of that rank
+    itself. ``group`` (n,): number of the node of each row.
     """
     held = np.zeros(group[-1] + 1, bool)
     held[group[holder == member]] = True
@@ -117,8 +117,8 @@ def _company(node: Ints, holder: Ints, group: Ints, member: int) -> Ints:
 
 
 class Copies:
-    """Persistent MPI messages with the state of ghosts, in every step: positions, and velocities before and after the
-    kick.
+    """Persistent MPI messages that transfer the state of ghosts in every step: positions, and velocities before and
+    after the kick.
     """
 
     def __init__(self, sends: list[Neighbour], receives: list[Neighbour], comm: Comm, tag: Tag) -> None:
@@ -142,7 +142,7 @@ class Copies:
         self._exchange = self._comm.exchange(_slices(self._out, sends, rows[0]), into, self._tag)
 
     def note(self, nodes: Nodes) -> None:
-        """Stores v(n-1/2), which the next message contains."""
+        """Stores the velocities v(n-1/2), which the next message contains."""
         _pack(self._out, 6, nodes.v, self._from)
 
     def begin(self, nodes: Nodes) -> None:
@@ -152,7 +152,9 @@ class Copies:
         self._exchange.begin()
 
     def finish(self, x: Floats, v: Floats, before: Floats) -> None:
-        """Receives the rows of the ghosts in ``x``, ``v`` and v(n-1/2), (surface_nodes, 3) each."""
+        """Receives the state of the ghosts. Writes it to the rows of ``x``, ``v`` and v(n-1/2), (surface_nodes, 3)
+        each.
+        """
         self._exchange.finish()
         _unpack(x, v, before, self._to, self._in)
 

@@ -1,4 +1,4 @@
-"""Table from corners to faces and edges; with this table the rows of a scene that a node separation can change are
+"""Table from corners to faces and edges. With this table the rows of a scene that a node separation can change are
 found without a pass over the whole scene.
 
 The rows of faces and edges of a scene do not change between two searches. When nodes separate, corners are replaced by
@@ -17,11 +17,11 @@ class Incidence:
     """Rows of faces or edges at each slot, according to the corners at the last search."""
 
     def __init__(self, corners: Indices) -> None:
-        """``corners`` (n, k): slots, before any corner has separated."""
+        """``corners`` (n, k): slots of the corners, before any node has separated."""
         self._begin, self._row = _by_slot(corners, int(corners.max(initial=-1)) + 1)
 
     def at(self, slots: Indices) -> Ints:
-        """Returns the rows, ascending, with a corner that was among the ``slots`` (m,) at the search; the value -1 in
+        """Returns the rows, ascending, with a corner that was one of the ``slots`` (m,) at the search. The value -1 in
         ``slots`` is ignored.
         """
         return np.asarray(_at(self._begin, self._row, slots))
@@ -47,7 +47,7 @@ def _by_slot(corners, slots):  # type: ignore[no-untyped-def]
 
 @njit(_I1(_I1, _N1, _N1), cache=True)
 def _at(begin, row, slots):  # type: ignore[no-untyped-def]
-    """Returns the rows for Incidence.at."""
+    """Returns the rows for the method ``Incidence.at``."""
     n, last = 0, len(begin) - 1
     for s in slots:
         if 0 <= s < last:

@@ -16,8 +16,9 @@ def build(
     sides: NearSurface, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, comm: Comm,
     passes: ScenePasses | None = None,
 ) -> Scene:  # fmt: skip
-    """Returns the scene of the surface ``sides`` for the next ``horizon``, s, without pairs. ``drift`` (3,): mean
-    velocity, m/s, equal on all ranks; ``passes``: passes of the scene, None for one thread. Collective.
+    """Returns the scene of the surface ``sides``, without pairs. ``horizon``: simulated time for which the scene is
+    used, s. ``drift`` (3,): mean velocity, m/s, equal on all ranks; ``passes``: passes of the scene, None for one
+    thread. Collective.
 
     The lists of shared nodes are added later, by a SplitUpdate.
     """

@@ -16,7 +16,7 @@ from . import ghosts
 HALO = 1.0
 """Ratio of the width of the halo to the typical size of a face. Candidate pairs between slots of different ranks are
 complete only while each slot has departed from its reference motion by less than half of this width. Before a slot
-departs further, all ranks search again."""
+departs further than this, all ranks search again."""
 
 
 @dataclass(frozen=True)
@@ -25,16 +25,16 @@ class Rules:
 
     domain: str
     allowed: Flags
-    """(parts, parts) whether each pair of parts may be in contact."""
+    """(parts, parts) True for each pair of parts that may be in contact."""
     cell: float
-    """Edge of a cell of the contact domain, m."""
+    """Length of the edge of a cell of the contact domain, m."""
     skin: float
-    """Skin, m. If two slots both depart from their reference motions by less than half of the skin, they cannot be in
-    contact without being candidates."""
+    """Skin, m. If two slots have both departed from their reference motions by less than half of the skin, they can be
+    in contact only if they are a candidate pair."""
     halo: float
     """Skin for pairs of slots of different ranks, m."""
     self_contact: Flags
-    """(parts,) whether the body of each part may be in contact with itself."""
+    """(parts,) True for each part whose body may be in contact with itself."""
 
 
 @dataclass
@@ -47,7 +47,7 @@ class NearSurface:
     surface_nodes: SurfaceNodes
     """Nodes of all faces and edges, and all local surface nodes."""
     owned: Ints
-    """Ids of the nodes that this rank owns, on the surface and on cracks that may open."""
+    """Global ids of the nodes that this rank owns and that are on the surface or on cracks that may open."""
 
     @cached_property
     def face_places(self) -> Indices:
@@ -60,8 +60,8 @@ class NearSurface:
         return self.surface_nodes.places(self.edges.nodes)
 
     def boxes(self, horizon: float, drift: Floats, margin: float) -> list[Boxes]:
-        """Bounding boxes of owned nodes, faces and edges. The boxes are swept over ``horizon``, s, and enlarged by
-        ``margin``, m, on all sides."""
+        """Bounding boxes of owned nodes, faces and edges. Each box contains the motion in the next ``horizon``, s, and
+        is enlarged by ``margin``, m, on all sides."""
         x, course = self.surface_nodes.x, self.surface_nodes.course - drift
         owned = Primitives(self.surface_nodes.places(self.owned[:, None]), np.full(len(self.owned), margin))
         faces = Primitives(np.ascontiguousarray(self.face_places[:, :3]), margin + DEEP * self.faces.size)
@@ -70,7 +70,9 @@ class NearSurface:
 
 
 def with_ghosts(sides: NearSurface, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> NearSurface:
-    """Returns ``sides`` together with the ghosts near this rank's surface. The edges of this rank come first."""
+    """Returns ``sides`` together with the ghosts near this rank's surface. In the result the edges of this rank come
+    first.
+    """
     nodes, faces, edges = sides.boxes(horizon, drift, 0.5 * rules.halo)
     askers = Boxes(np.concatenate([nodes.low, edges.low]), np.concatenate([nodes.high, edges.high]))
     chosen = domain.choose(rules.domain, askers, [faces, edges], rules.cell, comm)

@@ -17,9 +17,9 @@ _SLOTS, _EDGES, _TURNED = 2048, 8192, 2048
 """Number of slots in a task, number of faces or edges in a task, and number of edges in a task that computes angles.
 Chosen values: a task takes 10 to 20 us, compared with 2 us to start a parallel region."""
 _AHEAD = 16
-"""Distance, in nodes, by which data of nodes are prefetched."""
+"""Distance, in nodes, by which kernels prefetch the data of nodes."""
 _SPARSE = 32
-"""Largest ratio of the largest id to the number of wanted ids for which a table of all ids is used; above this ratio
+"""Largest ratio of the largest id to the number of wanted ids for which a table of all ids is used. Above this ratio
 the ids are found by bisection, because the table takes longer to fill (model/ids.py)."""
 _I, _I1, _B1, _U2, _F2, _N1, _N2 = (
     types.int64, types.int64[::1], types.boolean[::1], types.uint8[:, ::1], types.float64[:, ::1], types.int32[::1],
@@ -69,8 +69,9 @@ def _expose(table, first, stop, thread):  # type: ignore[no-untyped-def]
 def _enliven(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """Task: adds ``sharp`` edges to the broad phase.
 
-    An edge is added if its two ``faces`` (e, 2) are ``searched`` (f,); for one of the two faces it is sufficient to be
-    ``opened`` (e, 2). A face that this rank does not have is treated as searched, because its exposure is unknown.
+    An edge is added if both of its ``faces`` (e, 2) are in the broad phase (``searched`` (f,)). For one of the two
+    faces it is sufficient that its state in ``opened`` (e, 2) is not 0. A face that this rank does not have is treated
+    as being in the broad phase, because its exposure is unknown.
     """
     live, new, edges, faces, opened, sharp, searched = _read_enliven(table)
     for e in range(first, stop):
@@ -84,7 +85,7 @@ def _enliven(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _flag(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: flags each face or edge for which at least one of the first ``many`` corners is a flagged slot."""
+    """Task: flags each face or edge if at least one of its first ``many`` corners is a flagged slot."""
     out, corners, many, slots = _read_flag(table)
     for f in range(first, stop):
         for k in range(many):
@@ -93,7 +94,7 @@ def _flag(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _look_up(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: sets ``out`` to the rows of ids, by a table of all ids up to the largest id."""
+    """Task: sets ``out`` to the rows of ids. It uses a table of all ids up to the largest id."""
     out, ids, rows = _read_look_up(table)
     for k in range(first, stop):
         out[k] = rows[ids[k]] if ids[k] < len(rows) else -1
@@ -101,14 +102,14 @@ def _look_up(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _turn(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``sharp.turned``."""
+    """Task: runs ``sharp.turned`` for a range of edges."""
     found, is_sharp, corners, meets, x, part, least = _read_turn(table)
     sharp.turned(found, is_sharp, corners, meets, x, part, least, first, stop)
 
 
 @njit(TASK, cache=True)
 def _curve(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``buckets.interleaved``."""
+    """Task: runs ``buckets.interleaved`` for a range of points."""
     codes, x, origin, inverse = _read_curve(table)
     buckets.interleaved(codes, x, origin, inverse, first, stop)
 
@@ -140,7 +141,7 @@ class ScenePasses:
 
     def located(self, known: Ints, wanted: Ints) -> Indices:
         """Positions in ``known`` of the ids ``wanted``, in the shape of ``wanted``; -1 for ids that are not in
-        ``known``. ``known`` may have any order.
+        ``known``. The elements of ``known`` may have any order.
         """
         if _SPARSE * wanted.size < (largest := int(known.max(initial=-1))):
             return IdIndex(known).places(wanted)
@@ -154,14 +155,14 @@ class ScenePasses:
         self._flag_corners.run(len(corners), out, corners, many)
 
     def turned(self, sharp: Flags, corners: Indices, meets: Flags, x: Floats, part: Indices, least: Floats) -> Flags:
-        """(e,) whether each edge becomes sharp; see sharp.turned."""
+        """(e,) True for each edge that becomes sharp; see sharp.turned."""
         found = np.empty(len(sharp), bool)
         self._turn.run(len(sharp), found, sharp, corners, meets, x, part, least)
         return found
 
     def curve(self, x: Floats, edge: float) -> Ints:
-        """(n,) position of each point (n, 3) on a space-filling curve (Morton 1966) through cells with the edge
-        ``edge``, m. Neighbours on the curve are neighbours in space.
+        """(n,) position of each point (n, 3) on a space-filling curve (Morton 1966). The curve runs through cells with
+        the edge length ``edge``, m. Neighbours on the curve are neighbours in space.
         """
         codes = np.empty(len(x), np.int64)
         if len(x):

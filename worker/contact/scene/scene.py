@@ -28,7 +28,7 @@ from .passes import ScenePasses
 
 @dataclass
 class Messages:
-    """Persistent MPI messages between ranks that are sent in every step."""
+    """Persistent MPI messages of a scene; ranks send them in every step."""
 
     company: SharedSums
     """Sums of impulses at nodes to which contacts of several ranks apply impulses."""
@@ -43,7 +43,7 @@ class Messages:
 
 @dataclass
 class Scene:
-    """The result of the last search of all ranks, with the updates after the search."""
+    """Result of the last search of all ranks, with the updates after the search."""
 
     surface_nodes: SurfaceNodes
     own: OwnSlots
@@ -65,7 +65,7 @@ class Scene:
     messages: Messages = field(init=False)
     _stored: Kept | None = field(default=None, init=False)
     _cracks: Floats | None = field(default=None, init=False)
-    """Argument of the last call of ``stored``."""
+    """Argument of the last call of the method ``stored``."""
 
     def __post_init__(self) -> None:
         """Declares the columns with one value for each slot."""
@@ -76,7 +76,7 @@ class Scene:
             columns.declare(lines, **Lines.COLUMNS)
 
     def add_slots(self, rows: SurfaceNodes) -> None:
-        """Adds slots for the nodes ``rows``."""
+        """Adds slots for the nodes ``rows`` to the scene."""
         first, surface_nodes = self.surface_nodes.n, self.surface_nodes
         self.slots.columns.extend(first, rows.n)
         for column, values in zip(surface_nodes.columns(), rows.columns(), strict=True):
@@ -86,11 +86,13 @@ class Scene:
         self.own.add(first, rows)
 
     def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
-        """Makes the messages: sums over the shared nodes ``company``, and copies of the ghosts. Collective."""
+        """Makes the messages of the scene: sums over the shared nodes ``company``, and states of the ghosts.
+        Collective.
+        """
         self.messages = Messages(SharedSums(company, comm), ghosts.copies(self.surface_nodes, nodes, comm, Tag.GHOST))
 
     def extend(self, company: list[Neighbour], sends: list[Neighbour], receives: list[Neighbour]) -> None:
-        """Extends the messages after a node separation. Messages with unchanged lists of nodes are used again."""
+        """Extends the messages after a node separation. A message whose list of nodes is unchanged is used again."""
         messages = self.messages
         if not same(messages.company.neighbours, company):
             messages.company.take(company)
@@ -98,14 +100,14 @@ class Scene:
             messages.copies.take(sends, receives)
 
     def store_before(self, nodes: Nodes) -> None:
-        """Stores v(n-1/2). This function must be called before the kick."""
+        """Stores the velocities v(n-1/2). This function must be called before the kick."""
         own = self.own
         self.passes.store.run(len(own.local), self.slots.before, nodes.v, own.slots, own.local)
         self.messages.copies.note(nodes)
 
     def stored(self, cracks: Floats) -> Kept:
-        """Stored impulses of the pairs and of the ``cracks`` (m, 12). The same object is returned while the arrays use
-        the same memory.
+        """Returns the stored impulses of the pairs and of the ``cracks`` (m, 12). The method returns the same object
+        while the arrays use the same memory.
         """
         before, pairs = self._stored, self.node_face.kept
         if before is not None and before.pairs is pairs and cracks is self._cracks:
@@ -117,8 +119,8 @@ class Scene:
 
     @property
     def kept(self) -> tuple[Ints, Floats]:
-        """Two arrays about the pairs that had impulses in the last step: (k, 2) ids of node and face, and (k, 4) stored
-        impulses.
+        """Returns two arrays about the pairs that had impulses in the last step: (k, 2) ids of node and face, and (k,
+        4) stored impulses.
         """
         table = self.node_face
         some = table.pushed
@@ -128,8 +130,8 @@ class Scene:
     def remember(self, keys: Ints, kept: Floats, nodes: Nodes, comm: Comm) -> None:
         """Copies the stored impulses ``kept`` of the pairs ``keys`` from the scene of the last search. Collective.
 
-        Before the call the pairs of a copied node were on the rank of its parent; now they are on the rank that owns
-        the copy.
+        Before the call the pairs of a copied node are on the rank of its parent. After the call they are on the rank
+        that owns the copy.
         """
         rows = np.column_stack([keys, kept.view(np.int64)])
         if comm.size > 1:
@@ -143,12 +145,12 @@ class Scene:
         self.node_face.recall(self.slots.first, pairs, np.ascontiguousarray(rows[here, 2:]).view(np.float64))
 
     def rows_of(self, faces: Ints) -> Indices:
-        """(k,) rows of those ``faces``, given by ids, that this rank has."""
+        """Returns (k,) the rows of those ``faces``, given by ids, that this rank has."""
         rows = places(self.faces.id, faces)
         return rows[rows >= 0]
 
     def expose(self, faces: Ints) -> None:
-        """Adds faces to the surface; ``faces``: ids."""
+        """Adds the faces with the ids ``faces`` to the surface."""
         rows = self.rows_of(faces)
         self.faces.exposed[rows] = self.faces.fresh[rows] = True
         edges = self.edges
@@ -178,8 +180,8 @@ class Scene:
         _enliven(slots.live, slots.new, slots.owned, self.faces.corners, rows.astype(np.int32, copy=False))
 
     def settle_live(self) -> Flags:
-        """Updates which nodes and edges are in the broad phase, and which slots are measured. Returns (slots,) whether
-        the motion of each slot is measured from now on.
+        """Updates which nodes and edges are in the broad phase. Returns (slots,) flags: True if the motion of the slot
+        is measured from now on.
         """
         before = self.slots.tracked.copy()
         nodes = self.slots.owned & self.slots.on_surface & ~self.slots.live
@@ -205,8 +207,8 @@ class Scene:
         return bool(self.faces.new.any() or self.slots.new.any() or self.edges.new.any())
 
     def sharpen(self, least: Floats) -> Flags:
-        """(e,) whether each edge has become sharp, by the cosines ``least`` (parts,). Edges that have become sharp are
-        added to the broad phase.
+        """Returns (e,) flags: True for each edge that has become sharp, by the cosines ``least`` (parts,). The method
+        adds these edges to the broad phase.
         """
         edges, surface_nodes = self.edges, self.surface_nodes
         turned = self.passes.turned(edges.sharp, edges.corners, edges.meets, surface_nodes.x, surface_nodes.part, least)
@@ -215,7 +217,7 @@ class Scene:
         return turned
 
     def chain(self) -> None:
-        """Builds the linked lists of the pairs of each node again."""
+        """Builds the linked lists of the pairs of each node again, after the pairs have changed."""
         self.slots.first[:] = -1
         self.node_face.hang(self.slots.first, 0)
 
@@ -241,7 +243,9 @@ class Scene:
 
 @njit("void(boolean[::1], boolean[::1], boolean[::1], int32[:, ::1], int32[::1])", cache=True)
 def _enliven(live, new, owned, corners, rows):  # type: ignore[no-untyped-def]
-    """Adds the slots of the faces ``rows`` (k,) to the broad phase, if the slots are ``owned`` (slots,)."""
+    """Adds the slots of the faces ``rows`` (k,) to the broad phase. Only slots that are ``owned`` (slots,) are
+    added.
+    """
     for f in rows:
         for k in range(3):
             a = corners[f, k]

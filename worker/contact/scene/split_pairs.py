@@ -1,5 +1,5 @@
-"""Faces, edges and candidate pairs after a node separation (split). Corners are replaced by copies, and new pairs are
-found. New pairs are the pairs that a copy gets from its parent, and pairs whose members had a common node before the
+"""Faces, edges and candidate pairs after a node separation (split). The module replaces corners by copies, and finds
+new pairs. A new pair is a pair that a copy gets from its parent, or a pair whose members had a common node before the
 separation.
 """
 
@@ -22,9 +22,9 @@ class Family(NamedTuple):
     """Separated nodes, and the copies of each separated node."""
 
     first: Indices
-    """(surface_nodes,) row of ``member`` of the first copy of each node; -1 for a node without copies."""
+    """(surface_nodes,) row in ``member`` of the first copy of each node; -1 for a node without copies."""
     member: Indices
-    """(c, 2) slot of each copy, and whether the copy is the last one of its parent."""
+    """(c, 2) slot of each copy, and flag: 1 if the copy is the last one of its parent."""
     most: int
     """Largest number of copies of one node."""
     pairs: Indices
@@ -67,8 +67,8 @@ def _become(ids, key, became, node, tet):  # type: ignore[no-untyped-def]
 
 @njit(_I1(_N2, _N1, _I1), cache=True)
 def _torn(corners, first, near):  # type: ignore[no-untyped-def]
-    """Returns those of the rows ``near`` of ``corners`` (n, 4 or 6) that contain a node with copies; ``first``: see
-    Family.
+    """Returns the rows of ``corners`` (n, 4 or 6) that contain a node with copies. Only the rows ``near`` are tested.
+    ``first``: see Family.
     """
     rows, n = np.empty(len(near), np.int64), 0
     for row in near:
@@ -102,8 +102,9 @@ def follow_faces(near, corners, fresh, faces, first, ids, key, became):  # type:
 
 @njit(several(_I1, _N2, _B1)(_I1, _N2, _B1, _I2, _N1, _I1, _I1, _N1), cache=True)
 def follow_edges(near, corners, fresh, sides, first, ids, key, became):  # type: ignore[no-untyped-def]
-    """Replaces nodes of edges by copies of separated nodes, in the same way as ``follow_faces``; also returns which
-    edges are removed because their two faces have separated there. ``sides`` (e, 2): ids of the two faces of each edge.
+    """Replaces nodes of edges by copies of separated nodes, in the same way as ``follow_faces``. Also returns flags of
+    the edges that are removed because their two faces have separated at a common node. ``sides`` (e, 2): ids of the two
+    faces of each edge.
     """
     rows = _torn(corners, first, near)
     old, gone = np.empty((len(rows), 6), np.int32), np.zeros(len(rows), np.bool_)
@@ -151,11 +152,11 @@ def inherited(family, first, following, pairs):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def apart_from_faces(pairs, rows, old, now, first, member, owned, meets):  # type: ignore[no-untyped-def]
-    """Writes the pairs of a node and a face whose face had the node as a corner before the separation and does not have
+    """Writes new pairs of a node and a face: the face had the node as a corner before the separation and does not have
     it now. Returns the number of pairs.
 
-    ``rows``: rows of the faces; ``old`` and ``now`` (r, 4): corners of these faces before and after; ``first`` and
-    ``member``: see Family.
+    ``rows``: rows of the faces; ``old`` and ``now`` (r, 4): corners of these faces before and after the separation;
+    ``first`` and ``member``: see Family.
     """
     n = 0
     for r in range(len(rows)):
@@ -177,10 +178,10 @@ def apart_from_faces(pairs, rows, old, now, first, member, owned, meets):  # typ
 
 @njit(_I2(_N2, _N2, _N1, _B1), cache=True)
 def apart_from_edges(old, now, first, own):  # type: ignore[no-untyped-def]
-    """(p, 2) pairs of edges that had a common end before the separation and have none now. The edge with the smaller
-    faces is first; only pairs whose first edge is this rank's are returned.
+    """(p, 2) pairs of edges that had a common end before the separation and have none now. In a pair, the edge with the
+    smaller faces is first. Only pairs whose first edge belongs to this rank are returned.
 
-    ``old`` and ``now`` (e, 6): nodes of the edges before and after; ``first``: see Family.
+    ``old`` and ``now`` (e, 6): nodes of the edges before and after the separation; ``first``: see Family.
     """
     ends, m = np.empty(2 * len(old), np.int32), 0
     at = np.empty(2 * len(old), np.int64)

@@ -54,8 +54,8 @@ class SplitUpdate:
         self._across(cracks, rows, near)
 
     def _join(self, near: Indices, family: Indices, neighbours: list[Neighbour]) -> None:
-        """Adds nodes to the scene: the local nodes ``near``, and the families of nodes that are in the scene or on
-        other ranks. Updates the mobilities and parts of all separated nodes.
+        """Adds nodes to the scene: the local nodes ``near``, and all nodes of a family if one of them is in the scene
+        or on another rank that uses it. Updates the mobilities and parts of all separated nodes.
         """
         scene, here = self._scene, self._here
         have = np.zeros(len(family), bool)
@@ -161,8 +161,8 @@ class SplitUpdate:
 
 
 def _heirs(some: Neighbour, family: Indices, flags: Flags) -> Neighbour:
-    """Appends copies of nodes to the list of the nodes shared with a rank, ``some``. ``family`` (c, 2): parents and
-    copies, -1 for a node that is not present; ``flags``: working array, all False.
+    """Appends copies of nodes to ``some``, the list of the nodes shared with one rank. ``family`` (c, 2): parents and
+    copies, -1 for a node that is not present; ``flags``: working array, in which all values are False.
     """
     heirs = family[meets(flags, some.nodes, family), 1]
     return Neighbour(some.rank, extended(some.nodes, heirs)) if len(heirs) else some
@@ -170,7 +170,7 @@ def _heirs(some: Neighbour, family: Indices, flags: Flags) -> Neighbour:
 
 @njit("void(boolean[::1], int32[::1], int32[::1])", cache=True)
 def _mark(flags, some, others):  # type: ignore[no-untyped-def]
-    """Sets the flag of each element of ``some`` that is among the ascending ``others``."""
+    """Sets the flag of each element of ``some`` that is in the ascending array ``others``."""
     for i in range(len(some)):
         at = np.searchsorted(others, some[i])
         if at < len(others) and others[at] == some[i]:
@@ -179,7 +179,9 @@ def _mark(flags, some, others):  # type: ignore[no-untyped-def]
 
 @njit("int64[::1](int64[::1], int32[::1], int64[:, ::1], boolean[::1])", cache=True)
 def _joining(ids, places, family, have):  # type: ignore[no-untyped-def]
-    """Returns the rows of ``ids`` without slot, of a ``family`` (c, 2) that must be in the scene (``have``)."""
+    """Returns the rows of ``ids`` without a slot that need one, because their ``family`` (c, 2) must be in the scene
+    (``have``).
+    """
     wanted = np.sort(family[have].reshape(-1))
     rows, n = np.empty(len(ids), np.int64), 0
     for i in range(len(ids)):
@@ -237,8 +239,9 @@ def _push(pushes, near, ring, place):  # type: ignore[no-untyped-def]
 
 @njit("int32[::1](int64[:], int32[:], int32[:], int32[::1], int32[::1], boolean[::1])", cache=True)
 def _newly_shared(ids, local, places, holds, shares, flags):  # type: ignore[no-untyped-def]
-    """Returns the slots of the parents that a rank ``holds`` but does not yet ``share``, by ascending id, each once.
-    ``ids``, ``local`` and ``places`` belong to the parents; ``flags``: working array, all False.
+    """Returns the slots of the parents that a rank ``holds`` but does not yet ``share``. Each slot is returned once, in
+    the order of ids. ``ids``, ``local`` and ``places`` belong to the parents; ``flags``: working array, in which all
+    values are False.
     """
     some, n = np.empty(len(ids), np.int64), 0
     for i in range(len(ids)):

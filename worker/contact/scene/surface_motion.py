@@ -1,4 +1,6 @@
-"""Positions and velocities of the surface between two searches, and the validity of the candidate list."""
+"""Positions and velocities of the surface between two searches. The module also decides whether the candidate list is
+still valid.
+"""
 
 from typing import ClassVar
 
@@ -16,11 +18,11 @@ from . import ghosts
 from .near_surface import HALO, NearSurface
 
 _HORIZONS = np.array([10.0, 20.0, 40.0, 80.0, 160.0, 300.0])
-"""Smallest horizon and largest horizon of a search, in steps."""
+"""Smallest and largest horizon of a search, in steps. The horizon is the time for which the result is valid."""
 _SWEPT = 8.0
-"""Largest mean number of cells that a node may sweep in a horizon; chosen value: two cells along each axis."""
+"""Largest mean number of cells that a node may sweep in a horizon. Chosen value: two cells along each axis."""
 _SPENT = 0.4
-"""Fraction of the width of the halo. If a node departs further from its extrapolated position, all ranks must
+"""Fraction of the width of the halo. If a node departs further than this from its extrapolated position, all ranks must
 search."""
 
 
@@ -34,15 +36,15 @@ class SurfaceMotion:
         """``mobility`` (nodes, 3): see records.SurfaceNodes; ``size``: typical size of a face, m."""
         self._comm, self._size = comm, size
         self.until = 0.0
-        """Time up to which the last search is valid, s, if no node departs too far."""
+        """Simulated time up to which the last search is valid, s, if no node departs too far."""
         self.mobility = mobility
         self.loose = np.zeros(nodes.n, bool)
-        """(nodes,) whether each node has no tets."""
+        """(nodes,) True for each node that has no tets."""
         self.begin(nodes, nodes.v, 0.0)
         self.follow(found, nodes)
 
     def follow(self, found: Surface, nodes: Nodes) -> None:
-        """Replaces the surface. Collective."""
+        """Replaces the surface by a new one. Collective."""
         self.found = found
         """Returns the surface of this rank."""
         self._watched = found.flags | found.waiting
@@ -50,16 +52,17 @@ class SurfaceMotion:
         """Returns faces, edges and nodes of the surface."""
 
     def forget(self, removed: Flags) -> None:
-        """Marks the nodes ``removed`` (nodes,) as removed, so that they are ignored from now on."""
+        """Marks the nodes ``removed`` (nodes,) as removed. The motion ignores removed nodes from now on."""
         self._watched &= ~removed
 
     def begin(self, nodes: Nodes, course: Floats, t: float) -> None:
-        """Stores the positions at time ``t`` and the extrapolated velocities ``course`` (nodes, 3)."""
+        """Stores the positions at the simulated time ``t`` and the extrapolated velocities ``course`` (nodes, 3)."""
         self._x, self._course, self._t = spacious_copy(nodes.x), spacious_copy(course), t
 
     def spent(self, nodes: Nodes, t: float, dt: float) -> bool:
-        """Returns True if the candidate list will be invalid at the time ``t`` + ``dt``. The reason is that the horizon
-        has passed, or that a node departs so far that its ghost may be missing on another rank.
+        """Returns True if the candidate list will be invalid at the simulated time ``t`` + ``dt``. There are two
+        possible reasons: the horizon has passed, or a node departs so far that its ghost may be missing on another
+        rank.
         """
         if t + dt > self.until:
             return True
@@ -102,11 +105,11 @@ class SurfaceMotion:
         surface_nodes.x[places], surface_nodes.v[places], surface_nodes.course[places] = far.x, far.v, far.course
 
     def foresight(self, dt: float) -> tuple[float, Floats]:
-        """Returns the horizon of a search in steps ``dt``, and the mean velocity (3,), m/s. Collective.
+        """Returns the horizon of a search in steps of length ``dt``, and the mean velocity (3,), m/s. Collective.
 
-        The horizon is the largest one with which the mean volume swept by a node is below ``_SWEPT`` cells of the size
-        of a face. The swept length is about the length of a face if all nodes move, and much more if only few nodes are
-        fast.
+        The horizon is as long as possible. The limit is that the mean volume swept by a node is below ``_SWEPT`` cells
+        of the size of a face. The swept length is about the length of a face if all nodes move. It is much longer if
+        only few nodes are fast.
         """
         surface_nodes, owned = self.sides.surface_nodes, self.sides.owned
         v = surface_nodes.course[surface_nodes.places(owned)]

@@ -1,5 +1,5 @@
-"""Topology changes by a node separation (split) near one rank: changes of the nodes of the rank, and changes of ghosts.
-The changes of ghosts are received from other ranks.
+"""Topology changes near one rank by a node separation (split). They consist of the changes of the nodes of the rank,
+and the changes of ghosts, which other ranks send.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,8 @@ class SplitOfGhosts:
 def exchange(split: Split, scene: Scene, here: SurfaceNodes, comm: Comm) -> SplitOfGhosts | None:
     """Sends the separations of nodes to the ranks that have the nodes as ghosts. Returns the separations of the ghosts
     of this rank; None if no ghost has separated. ``here``: all nodes of this rank, by local index. Separations of
-    ghosts are received from the rank that sends the state of the ghosts. Only ranks with such messages take part.
+    ghosts are received from the rank that sends the state of the ghosts. Only ranks that send or receive such messages
+    take part.
     """
     sources = [other.rank for other in scene.messages.copies.receives if split.touched[other.rank]]
     if not (sources or split.touched[comm.rank]):
@@ -53,8 +54,8 @@ def exchange(split: Split, scene: Scene, here: SurfaceNodes, comm: Comm) -> Spli
 
 
 def _messages(split: Split, scene: Scene, here: SurfaceNodes) -> dict[int, Ints]:
-    """Returns the messages, keyed by rank: columns key and became of SplitOfGhosts, families, and the nodes of the
-    families.
+    """Returns a dictionary of messages; the keys are ranks. A message consists of the columns key and became of
+    SplitOfGhosts, the families, and the nodes of the families.
     """
     messages, flags = {}, np.zeros(here.n, bool)
     table, local = np.column_stack([split.key, here.id[split.node]]), split.family
@@ -75,8 +76,8 @@ def _messages(split: Split, scene: Scene, here: SurfaceNodes) -> dict[int, Ints]
 
 @njit("int64[::1](boolean[::1], int32[::1], int32[:, ::1])", cache=True)
 def meets(flags, nodes, family):  # type: ignore[no-untyped-def]
-    """Returns the rows of a ``family`` (c, 2) whose parents are among the ``nodes``; ``flags``: working array, all
-    False.
+    """Returns the rows of a ``family`` (c, 2) whose parent is one of the ``nodes``. ``flags``: working array, in which
+    all values are False.
     """
     rows, n = np.empty(len(family), np.int64), 0
     for a in nodes:

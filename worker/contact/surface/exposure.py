@@ -1,4 +1,4 @@
-"""Faces of the neighbours of eroded tets become surface without a search.
+"""Exposure of faces by erosion: faces of the neighbours of eroded tets become surface without a search.
 
 A tet is near erosion if its strain or damage is above a certain fraction of its limit. A search includes the inner
 faces of tets near erosion in the same way as the sides of cracks: with their nodes, on all ranks near the faces, but
@@ -50,8 +50,8 @@ def near_erosion(blocks: list[Block]) -> Ints:
 
 
 def covered(blocks: list[Block], tired: Ints, neighbours: list[Neighbour], comm: Comm) -> Indices:
-    """(k, 3) block, row and face of those faces of this rank's tets that are behind tets near erosion. ``tired``: tets
-    near erosion on this rank and its neighbours. Collective.
+    """(k, 3) block, row and face of faces of this rank's tets. The faces are those behind tets near erosion. ``tired``:
+    tets near erosion on this rank and its neighbours. Collective.
     """
     received = comm.swap({other.rank: tired for other in neighbours})
     every = np.unique(np.concatenate([tired, *received.values()]))
@@ -63,15 +63,15 @@ def covered(blocks: list[Block], tired: Ints, neighbours: list[Neighbour], comm:
 
 
 def leaving(block: Block, worn: Ints, ids: Ints) -> Ints:
-    """(k, WORDS) words of the tets in the rows ``worn`` (k,). ``ids``: global ids of the local nodes. A face across an
-    open crack has the word -1, because the face is surface already.
+    """(k, WORDS) words of the tets in the rows ``worn`` (k,), which erode. ``ids``: global ids of the local nodes. A
+    face across an open crack has the word -1, because the face is surface already.
     """
     behind = np.where(block.bond[worn] == WIDE, -1, block.across[worn]) if len(block.bond) else block.across[worn]
     return np.column_stack([block.id[worn], behind, ids[block.tets[worn]]])
 
 
 def exposed_by(rows: Ints) -> Exposure:
-    """Returns the faces that the erosion of the tets ``rows`` (k, WORDS) of all ranks exposes."""
+    """Returns the faces that the erosion of tets exposes. ``rows`` (k, WORDS): eroding tets of all ranks."""
     gone = np.sort((4 * rows[:, :1] + np.arange(4)).reshape(-1))
     behind, nodes = rows[:, 1:5], rows[:, 5:][:, FACES]
     bare: Flags = (behind >= 0) & ~among(gone, behind)
@@ -79,7 +79,7 @@ def exposed_by(rows: Ints) -> Exposure:
 
 
 def expose(blocks: list[Block], bare: Ints) -> None:
-    """Marks the local faces that are among ``bare`` (ids, ascending) as exposed by erosion."""
+    """Marks local faces as exposed by erosion. ``bare``: ids of the exposed faces, ascending."""
     tets = np.unique(bare // 4)
     for block in blocks:
         rows = np.flatnonzero(among(tets, block.id))

@@ -1,5 +1,5 @@
-"""Families. A family consists of an original node of the start and all its copies. A rank with a tet at a node has all
-nodes of the family.
+"""Families of nodes. A family consists of a node of the initial mesh and all its copies. A rank with a tet at a node
+has all nodes of the family.
 """
 
 from dataclasses import dataclass
@@ -19,12 +19,13 @@ from ...parallel.team import TASK, Team
 
 _N1, _N2, _I, _I1, _I2 = types.int32[::1], types.int32[:, ::1], types.int64, types.int64[::1], types.int64[:, ::1]
 _CRACKS, _BITS, _RANGES = 512, 6, 4
-"""Number of cracks in a task; number of bits of the index of a range of leaders; number of ranges in a task. Chosen
-values: a task takes 5 to 10 us with 20,000 cracks, compared with 2 us to start a parallel region."""
+"""Three constants of the sort: number of cracks in a task; number of bits of the index of a range of leaders; number of
+ranges in a task. Chosen values: a task takes 5 to 10 us with 20,000 cracks, compared with 2 us to start a parallel
+region."""
 _ROWS = 4096
 """Number of cracks in a task; chosen value: a task takes 10 to 20 us, compared with 2 us to start a parallel region."""
 _SPARE = 1 << 15
-"""Number of items of which the lengths of working arrays are multiples."""
+"""Number of items; the length of a working array is a multiple of it."""
 
 
 @dataclass
@@ -35,18 +36,18 @@ class Families:
     """Columns with one value for each node (model/columns.py)."""
 
     root: Ints
-    """(nodes,) global id of the original node of each node, at the start of the run."""
+    """(nodes,) global id of the node of the initial mesh from which each node originates."""
     ring: Indices
     """(nodes,) next local node of the family of each node, in cyclic order; the node itself if the family has one
     node."""
     leader: Indices
-    """(nodes,) local node that represents the family of each node."""
+    """(nodes,) leader of the family of each node; the leader is the local node that represents the family."""
     marks: Bits
     """(nodes,) marks that kernels use to list nodes. All marks are 0 between two calls."""
 
     @classmethod
     def of(cls, root: Ints) -> "Families":
-        """Links the nodes with equal ``root`` (nodes,) in a ring."""
+        """Links the nodes that have equal values in ``root`` (nodes,) in a ring."""
         (ring, leader), order = np.empty((2, len(root)), np.int32), np.argsort(root, kind="stable")
         first = np.flatnonzero(np.append(True, np.diff(root[order]) != 0)[: len(root)])
         following, ends = np.roll(order, -1), np.append(first, len(root))[1:]
@@ -55,7 +56,7 @@ class Families:
         return cls(root, ring, leader, np.zeros(len(root), np.uint8))
 
     def link(self, split: Split) -> None:
-        """Adds the copies of a node separation to the rings of their parents. The columns must already have the rows of
+        """Adds the copies of separated nodes to the rings of their parents. The columns must already have the rows of
         the copies.
         """
         _insert(self.ring, split.copies.parents, split.first)
@@ -63,13 +64,13 @@ class Families:
 
 @njit("void(int32[::1], int64[::1], int64)", cache=True)
 def _insert(ring, parents, first):  # type: ignore[no-untyped-def]
-    """Inserts copies into the ring after their parents. The copies have numbers from ``first`` on."""
+    """Inserts copies into the rings, each after its parent. The numbers of the copies start at ``first``."""
     for c in range(len(parents)):
         ring[first + c], ring[parents[c]] = ring[parents[c]], first + c
 
 
 class Corners(NamedTuple):
-    """Corners of narrow sides, at nodes that have separated into three pieces or more; the corners are ordered by
+    """Corners of narrow sides, at nodes that have separated into three pieces or more. The corners are ordered by
     family.
     """
 
@@ -99,8 +100,8 @@ _read_gather, _read_spread, _read_count, _read_list = (
 
 
 class CornerLists:
-    """Passes that list the corners of narrow sides by family. The list is made by a counting sort of the leaders of
-    families, first by ranges of leaders, then within each range.
+    """Passes of the threads that list the corners of narrow sides, ordered by family. The list is made by a counting
+    sort of the leaders of families, first by ranges of leaders, then within each range.
     """
 
     def __init__(self, team: Team) -> None:
@@ -111,7 +112,7 @@ class CornerLists:
         self._count, self._list = Pass(team, _count, *_COUNT, size=_RANGES), Pass(team, _list, *_LIST, size=_RANGES)
         self._scratch = Scratch()
         self.touching = TouchingRows(team)
-        """Pass that finds the cracks at marked nodes."""
+        """Pass of the threads that finds the cracks at marked nodes."""
 
     def of(self, cracks: Indices, sides: Indices, block: int, families: Families) -> Corners:
         """Returns the ``Corners`` of a ``block``, which are valid until the next call for this block.
@@ -135,14 +136,14 @@ class CornerLists:
         return found
 
     def _rooms(self, n: int) -> list[Indices]:
-        """Returns working arrays of at least ``n`` items. The same arrays are returned while the number of corners
-        grows little.
+        """Returns working arrays of at least ``n`` items. If the number of corners grows little, the same arrays are
+        returned again.
         """
         enough = -(-n // _SPARE) * _SPARE
         return [self._scratch.of(name, enough, np.int32) for name in ("code", "leader", "codes", "leaders", "heads")]
 
     def _found(self, block: int, members: int, families: int, nodes: int, corners: int) -> Corners:
-        """Returns arrays for the result."""
+        """Returns the arrays to which the result is written."""
         of = self._scratch.of
         found = Corners(
             of(f"members {block}", members, np.int32), of(f"begin {block}", families + 1, np.int32),
@@ -230,7 +231,7 @@ _read_touching = reader(*_TOUCHING)
 
 
 class TouchingRows:
-    """Pass that finds the rows of a table that contain a marked element."""
+    """Pass of the threads that finds the rows of a table that contain a marked element."""
 
     def __init__(self, team: Team) -> None:
         self._pass, self._scratch = Pass(team, _touching, *_TOUCHING, size=_ROWS), Scratch()

@@ -1,5 +1,5 @@
-"""Search for pairs of half edges, which are the edges between two faces. The half edges are found by a counting sort by
-their lower nodes.
+"""Search for pairs of half edges. A half edge is an edge of one face; a pair makes an edge between two faces. The half
+edges are found by a counting sort by their lower nodes.
 
 The sort is first by ranges of nodes, then by nodes within each range, so that the threads of a rank can share all
 passes.
@@ -16,10 +16,11 @@ from ...parallel.passes import Pass
 from ...parallel.team import TASK, Team
 
 _FACES, _BITS, _RANGES = 1024, 6, 4
-"""Number of faces in a task; number of bits of the index of a range of nodes; number of ranges in a task. Chosen
-values: a task takes some 20 us with 60,000 faces, compared with 2 us to start a parallel region."""
+"""Three constants of the sort: number of faces in a task; number of bits of the index of a range of nodes; number of
+ranges in a task. Chosen values: a task takes about 20 us with 60,000 faces, compared with 2 us to start a parallel
+region."""
 _EACH = 3
-"""Number of edges for each face for which memory is reserved, on average over a task."""
+"""Number of edges for each face for which memory is reserved. It is a mean over the faces of a task."""
 _I, _F, _I1, _I2, _N1, _N2 = (
     types.int64, types.float64, types.int64[::1], types.int64[:, ::1], types.int32[::1], types.int32[:, ::1],
 )  # fmt: skip
@@ -63,7 +64,7 @@ def _spread(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit("int32(int32[:, ::1], int64)", cache=True, forceinline=True)
 def _lower(corners, which):  # type: ignore[no-untyped-def]
-    """Lower node of a half edge."""
+    """Number of the lower node of a half edge."""
     f, k = which // 3, which % 3
     return min(corners[f, k], corners[f, (k + 1) % 3])
 
@@ -136,8 +137,8 @@ class HalfEdges:
         other face and the number of its half edge; sharpness.
 
         ``corners`` (f, 3 or more): corners of faces in the order of ascending face ids; corners are below ``nodes``.
-        ``half`` (f, 3): whether each half edge must be matched; half edge k is from corner k to the next corner.
-        ``sharp``: cosine of the smallest angle between the normals ``units`` of the two faces.
+        ``half`` (f, 3): True for each half edge that must be matched; half edge k goes from corner k to the next
+        corner. ``sharp``: cosine of the smallest angle between the normals ``units`` of the two faces.
         """
         n, shift, ranges, of = len(corners), max(0, (nodes - 1).bit_length() - _BITS), 1 << _BITS, self._scratch.of
         tasks = self._count.many(n)

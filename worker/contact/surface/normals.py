@@ -21,10 +21,10 @@ from ...parallel.team import TASK, Team
 from ..solver.loading import SHARES
 
 EVERY = 16
-"""Number of steps between two computations of the mean normals. Between two computations, a fragment that rotates at
-1e5 rad/s (100 m/s over 1 mm) rotates by 3 degrees."""
+"""Number of steps between two computations of the mean normals. In this time a fragment that rotates at 1e5 rad/s (100
+m/s over 1 mm) rotates by 3 degrees."""
 COLUMNS, SHARE = 12, 18
-"""Number of sums at a node; and number of words that a face contributes to the sums of its three nodes."""
+"""Number of sums at a node; and number of words that a face adds to the sums of its three nodes."""
 _NOTHING = 1e-300
 """Smallest area, m^2; it prevents a division by zero for a degenerate face."""
 _I2, _F2, _N1, _N2 = types.int64[:, ::1], types.float64[:, ::1], types.int32[::1], types.int32[:, ::1]
@@ -36,7 +36,7 @@ _read_exposed, _read_means = reader(*_EXPOSED), reader(*_MEANS)
 
 
 class MeanNormals:
-    """Passes over tets and nodes that compute mean normals, run by the threads of a team."""
+    """Passes over tets and nodes that compute mean normals. The threads of a team run the passes."""
 
     def __init__(self, team: Team) -> None:
         self._exposed, self._means = TetPass(team, _add_exposed, *_EXPOSED), Pass(team, _mean, *_MEANS)
@@ -55,15 +55,15 @@ class MeanNormals:
 
     def means(self, out: Floats, place: Indices, sums: Ints, nodes: Indices) -> None:
         """Sets the rows ``place`` (k,) of ``out`` (slots, COLUMNS) to means for the ``nodes`` (k,), computed from their
-        ``sums`` (nodes, COLUMNS). The means are area-weighted: of n, of n n, and of the directions to the faces. Zero
-        for a node without faces.
+        ``sums`` (nodes, COLUMNS). The area-weighted means are those of the normal n, of n n, and of the directions to
+        the faces. The row of a node without faces is zero.
         """
         self._means.run(len(nodes), out, place, sums, nodes)
 
 
 @njit(TASK, cache=True)
 def _mean(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: computes the means of ``MeanNormals.means``."""
+    """Task: computes the means of ``MeanNormals.means`` for a range of nodes."""
     out, place, sums, nodes = _read_means(table)
     for k in range(first, stop):
         a, s = nodes[k], place[k]
@@ -135,8 +135,8 @@ def _add_exposed(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], int64[:, ::1], int32[:, ::1])", cache=True)
 def add(sums, some, faces):  # type: ignore[no-untyped-def]
-    """Adds contributions ``some`` (f, SHARE) to the sums of the nodes of ``faces`` (f, 3); the value -1 in ``faces`` is
-    a node that is not on this rank.
+    """Adds contributions ``some`` (f, SHARE) to the sums of the nodes of ``faces`` (f, 3). A node that is not on this
+    rank has the value -1 in ``faces``.
     """
     for f in range(len(faces)):
         for m in range(3):

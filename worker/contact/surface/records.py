@@ -1,7 +1,8 @@
 """Tables of a surface: faces and edges, given by global node ids, and nodes with their state.
 
-A face has three nodes, counter-clockwise seen from outside, and the opposite node of its tet. An edge has its two nodes
-and, for each of its two faces, the third node and the opposite node of the tet; ranks exchange these rows unchanged.
+A face has three nodes, counter-clockwise seen from outside, and the opposite node of its tet. An edge has its two
+nodes. It also has, for each of its two faces, the third node of the face and the opposite node of the tet. Ranks
+exchange these rows unchanged.
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ AGED, OPEN = 1, 2
 
 @dataclass
 class Rows:
-    """Table whose columns are arrays of equal length."""
+    """Base class of tables. The columns of a table are arrays of equal length."""
 
     @property
     def n(self) -> int:
@@ -37,10 +38,10 @@ class Rows:
         return type(self)(*(column.take(rows, axis=0) for column in self.columns()))
 
     def spacious(self, rows: Ints) -> Self:
-        """Returns a table of the ``rows`` whose columns have spare rows."""
+        """Returns a table of the rows ``rows``. Its columns have spare rows."""
         taken = [spacious(len(rows), column.shape[1:], column.dtype) for column in self.columns()]
         for out, column in zip(taken, self.columns(), strict=True):
-            np.take(column, rows, axis=0, out=out, mode="clip")  # the mode "raise" would copy the result
+            np.take(column, rows, axis=0, out=out, mode="clip")  # numpy's mode "raise" would copy the result
         return type(self)(*taken)
 
     @classmethod
@@ -60,14 +61,14 @@ class Faces(Rows):
     size: Floats
     """(n,) size of each face, m: the square root of twice its initial area."""
     exposed: Flags
-    """(n,) whether each face is exposed; False for a side of a crack that is not open yet."""
+    """(n,) True for each exposed face; False for a side of a crack that is not open yet."""
 
 
 @dataclass
 class Edges(Rows):
-    """Edges. A row (a, b, c, d, e, f) means the edge ab between the face abc of tet abce and the face bad of tet badf;
-    the face of smaller id is first. If more than two faces share an edge, each pair of these faces that may enclose
-    material has a row.
+    """Table of edges. A row (a, b, c, d, e, f) is the edge ab between the face abc of tet abce and the face bad of tet
+    badf; the face of smaller id is first. If more than two faces share an edge, each pair of these faces that may
+    enclose material has a row.
     """
 
     nodes: Ints
@@ -82,11 +83,11 @@ class Edges(Rows):
     """(n, 2) state of each of the two faces: OPEN if it is exposed, AGED for a side of a crack older than cracks.AGE,
     else 0. An edge is in edge-edge contact if it is sharp, no state is 0 and at least one state is OPEN."""
     sharp: Flags
-    """(n,) whether each edge is sharp; see sharp.py."""
+    """(n,) True for each sharp edge; see sharp.py."""
 
     @property
     def names(self) -> Ints:
-        """(n,) ids of the two faces of each edge, combined into one number; the number identifies the edge, because two
+        """(n,) ids of the two faces of each edge, combined into one number. The number identifies the edge, because two
         faces have at most one edge in common.
         """
         return (self.sides[:, 0] << 32) + self.sides[:, 1]
@@ -104,7 +105,7 @@ class CrackSides:
 
 @dataclass
 class SurfaceNodes(Rows):
-    """Nodes in the order of ascending global ids: nodes of this rank, and ghosts of nodes of other ranks."""
+    """Table of nodes in the order of ascending global ids: nodes of this rank, and ghosts of nodes of other ranks."""
 
     id: Ints
     """(n,) global ids of the nodes."""
@@ -135,7 +136,9 @@ class SurfaceNodes(Rows):
 
 
 def merged(groups: list[SurfaceNodes]) -> SurfaceNodes:
-    """Returns all nodes once, by ascending id. A node that is in several groups has the row of the first group."""
+    """Returns all nodes once, by ascending global id. A node that is in several groups has the row of the first
+    group.
+    """
     groups = [group for group in groups if group.n] or groups[:1]
     if len(groups) == 1 and (groups[0].id[1:] > groups[0].id[:-1]).all():
         return groups[0]

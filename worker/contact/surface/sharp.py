@@ -1,4 +1,4 @@
-"""Edges between two faces of the surface; the module finds the edges and determines which of them are sharp; sharp
+"""Edges between two faces of the surface. The module finds the edges and determines which of them are sharp. Only sharp
 edges are in edge-edge contact.
 
 A half edge is an edge of one face, (a, b) of the face abc. Two half edges of opposite direction between the same nodes
@@ -30,15 +30,15 @@ SHARP = sine_and_cosine(math.radians(25.0))[1]
 """Cosine of the smallest angle between the normals of the two faces of a sharp edge. Chosen value."""
 BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
 """Two values for parts that are pressed together beyond their strength (cases/estimates/impact.py): cosine of the
-smallest angle of a sharp edge, and number of steps between two checks. The angle is smaller than for other parts,
-because ridges of initially flat surfaces may cross without a node inside of the other body, and contact exerts no
-pressure on overlapping material. Chosen values, by tests of flyer plates of copper at 1 to 2.4 km/s
+smallest angle of a sharp edge, and number of steps between two checks. For such parts the angle is smaller than for
+other parts, because ridges of initially flat surfaces may cross without a node inside of the other body, and contact
+exerts no pressure on overlapping material. Chosen values, by tests of flyer plates of copper at 1 to 2.4 km/s
 (docs/theory/contact.md, "Ridges under pressure")."""
 
 _A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _LOW, _NORMAL = range(11)
-"""Columns of a half edge that is sent to another rank: its nodes, the third node of its face and the opposite node, the
-owners of the last two, the face, its state, initial length, m, lowest initial height of its tet, m, and the unit normal
-of the face. Floats are sent as bit patterns."""
+"""Columns of a half edge that is sent to another rank: its two nodes; the third node of its face and the opposite node
+of the tet; the owners of these two nodes; the face, its state, its initial length, m, and the smallest initial height
+of its tet, m; and the unit normal of the face. Floats are sent as bit patterns."""
 _EDGES = 1024
 """Number of edges in a task; chosen value: a task takes some 30 us, compared with 2 us to start a parallel region."""
 _I1, _I2, _U1, _U2, _N2, _F1, _F2 = (
@@ -71,7 +71,7 @@ class EdgeFinder:
         self, model: Model, faces: Faces, local: Indices, units: Floats, heights: Floats, some: Flags, opened: Bits,
         neighbours: list[Neighbour], comm: Comm,
     ) -> tuple[Edges, Ints, Indices]:  # fmt: skip
-        """Returns the edges, sorted by the ids of their faces. Returns also the ids and owners of the nodes of edges
+        """Returns the edges, sorted by the ids of their faces. Returns also ids and owners of those nodes of the edges
         that this rank does not have.
 
         ``some`` (f,): faces whose edges are wanted; ``local`` (f, 4): local nodes of the faces; ``units`` (f, 3): unit
@@ -109,9 +109,7 @@ def depths(size: Floats, low: Floats) -> Floats:
 
 
 def _common(local: Indices, n: int, neighbours: list[Neighbour]) -> Flags:
-    """(f, 3) whether both nodes of each half edge are nodes that other ranks also have; ``n``: number of local
-    nodes.
-    """
+    """(f, 3) True for each half edge if other ranks have both of its nodes, too; ``n``: number of local nodes."""
     shared = np.zeros(n, bool)
     for other in neighbours:
         shared[other.nodes] = True

@@ -21,8 +21,8 @@ from .records import CrackSides, Edges, Faces
 from .sharp import EdgeFinder
 
 _UNSEEN, _COVERED, _YOUNG, _AGED, _EXPOSED, _BARE = range(6)
-"""Numbers of the kinds of faces: not on the surface; exposed if a tet erodes; side of a crack that may open, without or
-with edge-edge contact; exposed; exposed by erosion."""
+"""Numbers of the kinds of faces, in this order: not on the surface; exposed if a tet erodes; side of a crack that may
+open, without edge-edge contact; the same with edge-edge contact; exposed; exposed by erosion."""
 
 _TETS, _FACES = 8192, 1024
 """Number of tets in a task, and number of faces in a task. Chosen values: a task takes 10 to 50 us, compared with 2 us
@@ -46,20 +46,21 @@ class Surface:
     edges: Edges
     """Edges whose face of smaller id belongs to a tet of this rank. Edges that are not sharp are included."""
     flags: Flags
-    """(nodes,) whether each local node is or has been on the surface, by a face of any rank."""
+    """(nodes,) True for each local node that is or has been on the surface, by a face of any rank."""
     waiting: Flags
-    """(nodes,) whether each local node belongs to a face of any rank that may become surface before the next search."""
+    """(nodes,) True for each local node of a face, of any rank, that may become surface before the next search."""
     far: Ints
     """(k,) ids of those nodes of ``edges`` that this rank does not have."""
     far_owner: Indices
     """(k,) owners of those nodes of ``edges`` that this rank does not have."""
     corners: Indices
-    """(f, 4) local nodes of ``faces``, with the numbers that the nodes had when the surface was built."""
+    """(f, 4) local nodes of ``faces``; they have the numbers from the time when the surface was built."""
     turned: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(t,) names, ascending, of the ``edges`` that have become sharp during the run."""
+    """(t,) names, ascending, of the ``edges`` that have become sharp during the run; a name is a number that identifies
+    an edge."""
 
     def sharpen(self, names: Ints) -> None:
-        """Marks the edges with the ``names``, which are ascending, as sharp."""
+        """Marks the edges with the given ``names``, ascending, as sharp."""
         if len(names):
             own = self.edges.names
             self.turned, self.edges.sharp[among(names, own)] = np.intersect1d(own, names), True
