@@ -1,3 +1,3 @@
-"""The contract between client, server and worker: models of a case, messages of a run, files of a run. The package
-cases uses only the standard library, pydantic and msgspec.
+"""The models of a case, the messages of a run, and the names of its files: the interface of client, server and worker.
+The package cases uses only the standard library, pydantic and msgspec.
 """

@@ -11,12 +11,12 @@ from datetime import datetime
 from decimal import ROUND_HALF_UP, Decimal
 
 _Ladder = Sequence[tuple[float, str]]
-"""Factors and their units, the largest factor first: a value gets the first unit whose factor it reaches."""
+"""Factors and their unit names, the largest factor first. A value is written in the first unit whose factor is not
+above the value."""
 _UP: _Ladder = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"))
 _DOWN: _Ladder = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 _PREFIXED = ("m", "g", "J", "Pa", "N", "W", "B", "Hz", "m/s", "N s", "N m", "J/m^2", "B/s")
-"""Units that accept every SI prefix. All other units already have a prefix, contain a power, or are no physical
-units."""
+"""Units that may have any SI prefix. All other units contain a prefix or a power, or are not physical units."""
 _LADDERS: dict[str, _Ladder] = {
     **{unit: [(factor, prefix + unit) for factor, prefix in (*_UP, *_DOWN)] for unit in _PREFIXED},
     "s": [(factor, f"{prefix}s") for factor, prefix in _DOWN],
@@ -25,15 +25,15 @@ _LADDERS: dict[str, _Ladder] = {
     "m^3": [(1e-3, "m^3"), (1e-12, "mm^3"), (1e-18, "µm^3")],
 }
 _WORTH = {"m^2": 1.0, "mm^2": 1e-6, "µm^2": 1e-12, "m^3": 1.0, "mm^3": 1e-9, "µm^3": 1e-18}
-"""Value from which a unit of the tables is used, for units whose value differs from their factor."""
+"""Smallest value that is written in each unit of area and volume, SI, where it differs from the factor of the unit."""
 _PLAIN = 1e-3, 5
-"""A number is written without a power of ten if its decimal exponent is between these two exponents (chosen values).
-The larger exponent limits the number of digits before the decimal point."""
+"""Range of decimal exponents for which a number is written without a power of ten (chosen values). The upper end limits
+the number of digits before the decimal point."""
 _MOST = 1e12
-"""Value from which a whole number is written with a power of ten, because five groups of digits are hard to read
-(chosen value)."""
+"""Smallest whole number that is written with a power of ten, because five groups of digits are hard to read (chosen
+value)."""
 _MOST_HOURS = 10_000
-"""Wall time from which minutes are omitted: a year (chosen value)."""
+"""Hours of wall time from which on minutes are not written: about a year (chosen value)."""
 UNKNOWN = "–"
 """Text that stands for an unknown number."""
 
@@ -42,20 +42,20 @@ UNKNOWN = "–"
 
 
 def si(value: float | None, unit: str = "", digits: int = 3) -> str:
-    """Returns ``value`` with ``digits`` significant digits and its unit, with a fitting SI prefix if the unit accepts a
-    prefix. A number without a unit has no prefix; an unknown value is shown as a dash.
+    """Returns ``value`` with ``digits`` significant digits and its unit; the unit gets an SI prefix if it accepts
+    prefixes. A number without a unit has no prefix. An unknown value is written as a dash.
     """
     return alike([value], unit, digits)[0]
 
 
 def exact(value: float | None, unit: str = "", digits: int = 6) -> str:
-    """Returns the text of the function ``si`` without zeros at the end."""
+    """Returns the text that ``si`` returns, without zeros at the end of the number."""
     return _trimmed(si(value, unit, digits))
 
 
 def alike(values: Iterable[float | None], unit: str = "", digits: int = 3) -> list[str]:
-    """Returns the texts of values that belong together, such as a column of a table; all texts have the prefix of the
-    largest value.
+    """Returns the texts of values that are shown together, such as a column of a table; all texts have the prefix of
+    the largest value.
     """
     known = [math.nan if value is None else float(value) for value in values]
     worth, name = _unit(known, unit, digits)
@@ -63,7 +63,7 @@ def alike(values: Iterable[float | None], unit: str = "", digits: int = 3) -> li
 
 
 def exacts(values: Iterable[float | None], unit: str = "", digits: int = 6) -> list[str]:
-    """Returns the texts of the function ``si_all`` without zeros at the end."""
+    """Returns the texts that ``alike`` returns, without zeros at the end of the numbers."""
     return [_trimmed(text) for text in alike(values, unit, digits)]
 
 
@@ -98,7 +98,9 @@ def _unit(values: Sequence[float], unit: str, digits: int) -> tuple[float, str]:
 
 
 def _step(most: float, ladder: _Ladder, digits: int) -> tuple[float, str]:
-    """Returns the first unit whose factor ``most`` reaches after rounding; the last unit if ``most`` reaches none."""
+    """Returns the first factor and unit of ``ladder`` whose factor is not above ``most`` rounded to ``digits`` digits;
+    the last entry if there is none.
+    """
     return next((step for step in ladder if most >= step[0] * (1.0 - 0.5 * 10.0**-digits)), ladder[-1])
 
 
@@ -199,7 +201,9 @@ def _trimmed(text: str) -> str:
 
 
 def _parts(text: str) -> tuple[str, str, str]:
-    """Returns the digits, the power of ten with its letter e, and the unit with its space."""
+    """Returns the three pieces of a text: the digits, the power of ten from its letter e on, and the unit with the
+    space before it.
+    """
     shown, space, unit = text.partition(" ")
     digits, e, power = shown.partition("e")
     return digits, e + power, space + unit
@@ -237,7 +241,7 @@ def day(wall: float) -> str:
 
 
 def _moment(wall: float, form: str) -> str:
-    """Returns a dash for a time outside of the calendar."""
+    """Returns a date or time as text; a dash for a time outside of the calendar."""
     try:
         return datetime.fromtimestamp(wall).strftime(form)
     except (OverflowError, OSError, ValueError):

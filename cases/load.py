@@ -1,4 +1,4 @@
-"""Reading of cases: TOML or JSON text becomes a Case, or a CaseError with every error."""
+"""Reading of cases: TOML or JSON text becomes a Case, or a CaseError that lists every error."""
 
 import copy
 import json
@@ -27,8 +27,8 @@ __all__ = [
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*(?:\[\d{1,6}\])*(?:\.[A-Za-z_][A-Za-z0-9_-]*(?:\[\d{1,6}\])*)*")
 _ITEM = re.compile(r"([A-Za-z_][A-Za-z0-9_-]*)|\[(\d+)\]")
 _DEEPEST = 32
-"""Largest number of words of a dotted key in TOML, because the cost grows with the square of this number. Keys of a
-case have up to 6 words (reason of the chosen limit)."""
+"""Largest number of words of a dotted key in TOML. The limit is needed because the reading time increases with the
+square of this number. The keys of a case have up to 6 words (reason of the chosen value)."""
 _DEEP = re.compile(rf"""(?<![\w"'.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{_DEEPEST}}}""", re.ASCII)
 _MARK = "\ufeff"
 """Byte order mark that some editors write at the start of a file in UTF-8."""
@@ -36,7 +36,9 @@ _LINE = re.compile(r"\(at line (\d+), column \d+\)")
 
 
 def parse_case(data: Mapping[str, Any]) -> Case:
-    """Returns the case of plain data, as TOML or JSON gives it. Raises CaseError with every problem of the case."""
+    """Returns the case for data that a TOML or JSON reader has returned. Raises CaseError with every problem of the
+    case.
+    """
     if not isinstance(data, Mapping):
         raise CaseError([problem((), data, "a case is a table of keys")])
     read, problems = read_references(data)
@@ -63,7 +65,9 @@ def parse_json(text: str | bytes) -> Case:
 
 
 def read_case(path: Path) -> Case:
-    """Returns the case in a file whose name ends in .toml or .json. Raises CaseError if the file has no valid case."""
+    """Returns the case in a file whose name ends in .toml or .json. Raises CaseError if the file contains no valid
+    case.
+    """
     return parse_case(read_data(path))
 
 
@@ -155,9 +159,9 @@ Overrides = Iterable[str] | Mapping[str, Any]
 def apply_overrides(data: Mapping[str, Any], overrides: Overrides) -> dict[str, Any]:
     """Returns a copy of ``data`` with assignments such as ``run.ranks=2`` or ``parts[0].mesh.element_size=0.5 mm``.
 
-    The value of an assignment is read as TOML if it is valid TOML, otherwise as text; the value in a mapping is used
-    unchanged, a nested mapping key by key. An assignment adds missing tables of the case; items of lists must exist.
-    Raises CaseError with every assignment that cannot be made, and with every key that has two values.
+    An assignment whose value is valid TOML gets that value; any other value is used as text. A value of a mapping is
+    used unchanged; a nested mapping is applied key by key. Missing tables of the case are added; items of lists must
+    exist. Raises CaseError with every assignment that cannot be applied, and with every key that is set twice.
     """
     if isinstance(overrides, str) or not isinstance(overrides, Iterable):
         message = "write a list of assignments, such as ['run.ranks=2'], or values by key, such as {'run.ranks': 2}"
@@ -182,7 +186,9 @@ def apply_overrides(data: Mapping[str, Any], overrides: Overrides) -> dict[str, 
 
 
 def _assignments(overrides: Overrides, path: str = "") -> Iterator[tuple[str, str, Any]]:
-    """Key, text of the value for messages, and value; Ellipsis for an assignment without a value."""
+    """Yields for each assignment the key, its text for messages, and the value; Ellipsis if the assignment has no
+    value.
+    """
     if isinstance(overrides, Mapping):
         for name, value in overrides.items():
             key = f"{path}.{name}" if path else str(name)
@@ -236,8 +242,8 @@ def _entry(target: Any, item: int | str) -> Any:
 
 
 def resolved_json(case: Case) -> bytes:
-    """Returns the case as JSON with every default, in SI units, with every material of its parts; the text ends in a
-    line feed.
+    """Returns the case as JSON in SI units, with every default and with every material that its parts use. The text
+    ends in a line feed.
     """
     used = {part.material: material(case, part.material) for part in case.parts}
     full = case.model_copy(update={"materials": {**case.materials, **used}})
@@ -245,7 +251,7 @@ def resolved_json(case: Case) -> bytes:
 
 
 def shipped() -> dict[str, Path]:
-    """The shipped cases: file of each case by name."""
+    """The file of each shipped case, by the name of the case."""
     return {path.stem: path for path in sorted((Path(__file__).parent / "shipped").glob("*.toml"))}
 
 
@@ -258,5 +264,5 @@ def shipped_path(name: str) -> Path:
 
 
 def materials() -> list[str]:
-    """The names in the material library."""
+    """Returns the names of the materials of the library."""
     return sorted(library())

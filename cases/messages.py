@@ -1,7 +1,8 @@
-"""The messages of a run: lines of journal.jsonl, and samples on Zenoh and SSE.
+"""The messages of a run: the lines of journal.jsonl, which are also published over Zenoh and over SSE (server-sent
+events).
 
-The field ``seq`` numbers the messages of a run 1, 2, 3 ... without gaps, so that a reader detects a missing message and
-reads it from the journal. Messages are JSON in the journal and on SSE, and MessagePack on Zenoh. A reader ignores
+The field ``seq`` numbers the messages of a run 1, 2, 3 ... without gaps. A reader that misses a number reads that
+message from the journal. Messages are JSON in the journal and over SSE, and MessagePack over Zenoh. A reader ignores
 unknown fields of a message.
 """
 
@@ -13,7 +14,7 @@ from .ledger import Energy as Energy
 from .ledger import PartEnergy as PartEnergy
 
 VERSION = 1
-"""Version of the format of messages; a reader may refuse messages of other versions."""
+"""Version of the message format. A reader may refuse messages of other versions."""
 
 
 class Message(msgspec.Struct, tag_field="type", tag=str.lower, kw_only=True, frozen=True):
@@ -22,7 +23,7 @@ class Message(msgspec.Struct, tag_field="type", tag=str.lower, kw_only=True, fro
     """
 
     channel: ClassVar[str] = "event"
-    """Class of the Zenoh key under which the message is published (cases/output/keys.py)."""
+    """Second last part of the Zenoh key under which the message is published (cases/output/keys.py)."""
 
     run: str
     seq: int = 0
@@ -33,7 +34,7 @@ class Message(msgspec.Struct, tag_field="type", tag=str.lower, kw_only=True, fro
 
 
 class Status(Message, frozen=True):
-    """Message about a change of the state of the run, or about the present activity (field ``message``)."""
+    """Message: the state of the run has changed, or the worker has begun another activity (field ``message``)."""
 
     channel: ClassVar[str] = "state"
     state: str
@@ -42,7 +43,9 @@ class Status(Message, frozen=True):
 
 
 class Started(Message, frozen=True):
-    """Size of the model before the first step. ``setup``: wall time since the start of the worker, s."""
+    """Message: the model is ready for the first time step; its size. ``setup``: wall time since the start of the
+    worker, s.
+    """
 
     ranks: int
     elements: int
@@ -51,12 +54,12 @@ class Started(Message, frozen=True):
     setup: float
     parts: dict[str, int]
     threads: int = 1
-    """Number of tets of each rank."""
+    """Number of threads of each rank."""
 
 
 class Progress(Message, frozen=True):
-    """Message about the progress of the run. ``eta``: estimated remaining wall time, s; ``limiter``: what limits the
-    time step.
+    """Message: the progress of the run. ``eta``: estimated remaining wall time, s; ``limiter``: what limits the time
+    step.
     """
 
     end_time: float
@@ -68,16 +71,16 @@ class Progress(Message, frozen=True):
     parts: dict[str, PartEnergy] = {}
     """Energies of each part; empty for a case with a single part."""
     worst_residual: float | None = None
-    """Largest energy residual of all history lines so far; some of these lines lie between two messages."""
+    """Largest energy residual of all history lines so far, including lines between two messages."""
     sampled: float | None = None
     """Simulated time of the history line from which ``energy``, ``parts`` and ``probes`` are taken, s."""
     probes: dict[str, float | None] = {}
-    """Values of the probes by name, in SI units; None for a probe without a value."""
+    """Value of each probe by its name, in SI units; None for a probe without a value."""
 
 
 class Load(Message, frozen=True):
-    """Load of the ranks since the last Load message: CPU seconds per rank and phase, maximum of the work over its mean,
-    and communication. Each list has one number per rank.
+    """Message: the load of the ranks since the last Load message: CPU time of each rank in each phase, s; largest work
+    of a rank divided by the mean work; and communication. Each list has one number per rank.
     """
 
     channel: ClassVar[str] = "load"
@@ -85,32 +88,32 @@ class Load(Message, frozen=True):
     imbalance: float
     steps: int = 0
     waiting: list[float] = []
-    """CPU seconds of the phase ``exchange`` that are spent in calls that wait for other ranks."""
+    """CPU time of the phase ``exchange`` in calls that wait for other ranks, s."""
     messages: list[int] = []
-    """Number of point-to-point messages that each rank sends."""
+    """Number of point-to-point messages that each rank has sent."""
     bytes: list[int] = []
-    """Bytes of the point-to-point messages that each rank sends."""
+    """Number of bytes that each rank has sent in point-to-point messages."""
     collectives: list[int] = []
-    """Number of collective calls."""
+    """Number of collective calls of each rank."""
     collective_bytes: list[int] = []
-    """Bytes that the rank contributes to collective calls."""
+    """Number of bytes that each rank has contributed to collective calls."""
     outside: list[int] = []
     """Number of surface nodes that each rank owns."""
     serial: list[float] = []
-    """Wall time in which only one thread of the rank works, s, without waiting for other ranks."""
+    """Wall time in which only one thread of each rank works, s, without waiting for other ranks."""
     parallel: list[float] = []
-    """Wall time in parallel regions, whose tasks are divided among the threads of the rank, s."""
+    """Wall time in parallel regions of each rank (loops whose tasks are divided among its threads), s."""
     helped: list[float] = []
-    """Working time of all threads of the rank except the first, summed, s."""
+    """Sum of the working times of all threads of each rank except the first thread, s."""
     threads: int = 1
     """Number of threads of each rank."""
     projected: dict[int, dict[str, list[float]]] = {}
-    """Estimated CPU seconds of each phase without waiting, by number of threads."""
+    """Estimated CPU time of each phase without waiting, s, by the number of threads."""
 
 
 class Counts(Message, frozen=True):
-    """Message about the present size of the model. ``shared``: number of nodes on more than one rank; ``particles``:
-    number of free nodes, without tets.
+    """Message: the present size of the model. ``shared``: number of nodes on more than one rank; ``particles``: number
+    of free nodes, without tets.
     """
 
     channel: ClassVar[str] = "counts"
@@ -121,38 +124,41 @@ class Counts(Message, frozen=True):
     elements_per_rank: list[int]
     particles: int = 0
     facets: int = 0
-    """Number of broken facets."""
+    """Number of facets that have broken."""
     smallest: int = 0
-    """Exponent of the first class of the size distribution ``sizes``."""
+    """Exponent that gives the lower bound of the first class of ``sizes``."""
     sizes: list[int] = []
-    """Numbers of fragments by length; class i begins at 2^((smallest + i) / 2) m and ends at the next class. Empty if
-    no facet can break."""
+    """Numbers of fragments in classes of length: class i contains lengths from 2^((smallest + i) / 2) m up to the
+    beginning of the next class. The list is empty if no facet can break."""
     counted: int = -1
-    """Step at which ``fragments`` and ``sizes`` were counted: the present step or an earlier step; -1 if unknown."""
+    """Time step at which ``fragments`` and ``sizes`` were counted, the present one or an earlier one; -1 if they were
+    never counted."""
 
 
 class Balance(Message, frozen=True):
-    """Message: tets have moved to other ranks in a new decomposition."""
+    """Message: a new decomposition has moved tets to other ranks."""
 
     channel: ClassVar[str] = "load"
     cause: str
     before: dict[str, list[float]]
-    """Load before the decomposition, from the last Load message: CPU seconds per step by phase, one number per rank."""
+    """CPU time of each phase, s per step, one number per rank, from the last Load message before the decomposition."""
     predicted: list[float]
-    """Share of each rank in the quantity that is balanced: CPU seconds per step, outside nodes, or tets."""
+    """Predicted share of each rank in the balanced quantity: CPU time, s per step; or number of outside nodes; or
+    number of tets."""
     tets: int
     nodes: int
-    """Number of tets that have moved to other ranks."""
+    """Numbers of tets and of nodes that have moved to other ranks."""
     cost: float
     """Wall time of the decomposition, s."""
     saved: float
-    """Wall time saved by the earlier decompositions, s: estimate with the imbalance before each decomposition, less the
-    time used."""
+    """Wall time saved by the earlier decompositions, s: estimated time with the imbalance before each decomposition,
+    minus the time used."""
 
 
 class Groups(Message, frozen=True):
-    """Cost of groups of tets since the last Groups message, on any number of ranks. Tets of a group are neighbours at
-    the start and stay in the group. In the first message of a worker all loads are 0.
+    """Message: the cost of groups of tets since the last Groups message. The groups are the same for any number of
+    ranks. The tets of a group are neighbours at the start and stay in the group. In the first message of each worker
+    process all loads are 0.
     """
 
     channel: ClassVar[str] = "load"
@@ -161,14 +167,13 @@ class Groups(Message, frozen=True):
     outside: list[int]
     """Number of surface nodes of each group."""
     rank: int = 0
-    """CPU time of a rank without any group, ns per step."""
+    """CPU time per step of a rank without tets, ns."""
     centres: list[tuple[float, float, float]] = []
-    """Centres of the groups at the start, m. Only the first message contains the centres and the numbers of tets of the
-    groups."""
+    """Centres of the groups at the start, m. Only the first message has the fields ``centres`` and ``tets``."""
     tets: list[int] = []
     """Number of tets of each group at the start."""
     cost: float = 0.0
-    """Assumed cost of a decomposition before the first decomposition, wall time, s."""
+    """Wall time that a decomposition is assumed to cost before the first decomposition, s."""
 
 
 class Checkpoint(Message, frozen=True):
@@ -181,7 +186,7 @@ class Checkpoint(Message, frozen=True):
 
 
 class Frame(Message, frozen=True):
-    """Message: a frame is on disk. The ``path`` of the frame is relative to the run's folder."""
+    """Message: a frame is on disk. The ``path`` of the frame is relative to the folder of the run."""
 
     index: int
     path: str
@@ -195,27 +200,28 @@ class Snapshot(Message, frozen=True):
     channel: ClassVar[str] = "fragments"
     n: int
     path: str
-    """Path of the snapshot, relative to the run's folder."""
+    """Path of the snapshot, relative to the folder of the run."""
     bytes: int
     triangles: int
     fragments: int
     sha256: str
     cause: str = ""
-    """Reason for which the snapshot was made: ``run.snapshots``, ``asked for``, ``start`` or ``end``."""
+    """Reason for the snapshot: ``run.snapshots``, ``asked for``, ``start`` or ``end``."""
     dropped: int = 0
-    """Number of scheduled snapshots that were not made since the previous snapshot."""
+    """Number of scheduled snapshots that were skipped since the previous snapshot."""
     smallest: int = 0
-    """Exponent of the first class of the size distribution ``sizes``."""
+    """Exponent that gives the lower bound of the first class of ``sizes``."""
     sizes: list[int] = []
-    """Numbers of fragments by length; class i begins at 2^((smallest + i) / 2) m and ends at the next class."""
+    """Numbers of fragments in classes of length: class i contains lengths from 2^((smallest + i) / 2) m up to the
+    beginning of the next class."""
     tets: int = 0
-    """Size of the file with all tets of the snapshot, bytes; 0 without such a file."""
+    """Size of the file with all tets at the time of the snapshot, bytes; 0 if the snapshot has no such file."""
     fields: dict[str, list[float]] = {}
-    """Statistics of each field over the triangles: minimum, 0.5 % quantile, 99.5 % quantile, maximum."""
+    """Minimum, 0.5 % quantile, 99.5 % quantile and maximum of each field over the triangles."""
 
 
 class Fragments(Snapshot, tag="snapshot", kw_only=True, frozen=True):
-    """The message about a snapshot together with the snapshot itself, on Zenoh."""
+    """Message about a snapshot together with the bytes of the snapshot, as published over Zenoh."""
 
     blob: bytes
 
@@ -230,7 +236,7 @@ class Log(Message, frozen=True):
 
 
 class Finished(Message, frozen=True):
-    """Message: the outcome is on disk. This message is the last message of a worker."""
+    """Message: the outcome of the run is on disk. It is the last message of a worker process."""
 
     state: str
     digest: str

@@ -1,4 +1,4 @@
-"""The outcome file outcome.json: the last file that a run writes, and the only proof of the end of the run."""
+"""The outcome file outcome.json. A run writes it last; only this file proves that the run has ended."""
 
 import math
 from typing import Any
@@ -21,7 +21,7 @@ class Check(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Measured(msgspec.Struct, kw_only=True, frozen=True):
-    """Values of a probe: the last value, and the extremes over all lines of the history (NaN: unknown)."""
+    """Values of a probe: the last value, and the smallest and largest value of all history lines (NaN: unknown)."""
 
     name: str
     value: float
@@ -31,8 +31,8 @@ class Measured(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Made(msgspec.Struct, kw_only=True, frozen=True):
-    """The largest energy that a term of the energy ledger has created, divided by the largest energy until then, at
-    ``time``, s.
+    """The largest energy that a term of the energy ledger has created, divided by the largest energy so far, and the
+    simulated time ``time`` at which it was reached, s.
     """
 
     line: str
@@ -41,21 +41,23 @@ class Made(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Compressed(msgspec.Struct, kw_only=True, frozen=True):
-    """The largest compression of a part without a law of compressive failure (worker/elements/crushing.py)."""
+    """The largest compression of a part whose material has no law of compressive failure
+    (worker/elements/crushing.py).
+    """
 
     part: str
     times: float
-    """Compression divided by the limit of Griffith's criterion (cases/warnings/compression.py)."""
+    """Compression of the tet divided by the limit of Griffith's criterion (cases/warnings/compression.py)."""
     most: float
     """Largest principal pressure, Pa; negative in tension."""
     least: float
     """Smallest principal pressure, Pa."""
     tets: int
-    """Largest number of tets of the part that are beyond the criterion at the same time, of all history lines."""
+    """Largest number of tets of the part that exceed the criterion in one history line."""
     tet: int
-    """The tet with the largest compression."""
+    """Global id of the tet with the largest compression."""
     x: float
-    """Position of the tet at the time of the largest compression, m."""
+    """Position of this tet at the time of the largest compression, m."""
     y: float
     z: float
     time: float
@@ -63,8 +65,8 @@ class Compressed(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Sharing(msgspec.Struct, kw_only=True, frozen=True):
-    """Statistics of the parallel regions of rank 0, and the assumed cost of dividing them among threads
-    (worker/parallel/projecting.py); times in s.
+    """Measured times of the parallel regions of rank 0 (loops that its threads divide), s, and the costs of dividing
+    them that the estimates for other numbers of threads use (worker/parallel/projecting.py).
     """
 
     steps: int
@@ -72,17 +74,17 @@ class Sharing(msgspec.Struct, kw_only=True, frozen=True):
     colours: int
     tasks: int
     turn: float
-    """Cost of one colour of a parallel region."""
+    """Cost of one colour of tets in a parallel region."""
     call: float
-    """Cost of waking a sleeping thread, for the calling thread."""
+    """Time that a thread needs to wake a sleeping thread."""
     wake: float
-    """Time until a woken thread works."""
+    """Time until a thread that was woken works."""
 
 
 class Outcome(msgspec.Struct, kw_only=True, frozen=True):
-    """The end of a run; times in s, energies in J. An unknown count is None and any other unknown number is NaN; both
-    are null in the file. The outcome of a run that was lost, or that never started, has only data of its journal
-    (server/runs/ends.py).
+    """The end of a run; times in s, energies in J. A count that is unknown is None, and any other number that is
+    unknown is NaN; both are null in the file. The outcome of a run that was lost or never started has only the data
+    that its journal contains (server/runs/ends.py).
     """
 
     state: str
@@ -97,14 +99,16 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     setup: float = math.nan
     """Wall time from the start of the worker to its first step, s."""
     cpu: float = math.nan
-    """CPU time of all ranks and their threads in the step loop, s; threads count only while they work."""
+    """CPU time of all ranks and their threads in the loop over the time steps, s; a thread counts only while it works.
+    """
     digest: str = ""
-    """SHA-256 of the state of nodes and tets in the order of global ids; the hash is equal for any number of ranks."""
+    """SHA-256 of the state of all nodes and tets in the order of their global ids. It is equal for any number of ranks.
+    """
     elements: int | None = None
     eroded: int | None = None
     """Number of deleted tets."""
     eroded_mass: float = math.nan
-    """Mass of nodes that were deleted with the last of their tets, kg."""
+    """Mass of the nodes that were deleted because they had lost all tets, kg."""
     nodes_initial: int | None = None
     nodes: int | None = None
     fragments: int | None = None
@@ -113,52 +117,53 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     first_break: float = math.nan
     """Simulated time at which the first facet broke, s; NaN if no facet broke."""
     inside: int | None = None
-    """Number of nodes that end inside another body or fragment, deeper than 0.05 of the typical face size; free nodes
-    count also inside of their own part."""
+    """Number of nodes that are inside another body or fragment at the end, deeper than 0.05 of the typical face size. A
+    free node also counts if it is inside its own part."""
     deepest: float = math.nan
-    """Depth of the deepest penetrating node that has not passed the outermost tets, divided by the typical face
-    size."""
+    """Depth of the deepest node inside another body, divided by the typical face size; nodes that have passed the
+    outermost tets do not count."""
     overlapping: int | None = None
-    """Number of surface tets that end with more than a tenth of their volume in other bodies or fragments."""
+    """Number of surface tets with more than a tenth of their volume inside other bodies or fragments at the end."""
     overlap: float = math.nan
-    """Common volume of penetrating bodies and fragments divided by the volume of all surface tets."""
+    """Volume of surface tets inside other bodies and fragments at the end, divided by the volume of all surface tets.
+    """
     rebalances: int | None = None
     balancing_cost: float = math.nan
     """Wall time of all decompositions, s."""
     balancing_saved: float = math.nan
-    """Wall time saved by the decompositions, s: estimate with the imbalance before each decomposition, less the time
-    used."""
+    """Wall time saved by the decompositions, s: estimated time with the imbalance before each decomposition, minus the
+    time used."""
     energy: Energy | None = None
     worst_residual: float = math.nan
     """Largest energy residual of all history lines of the run."""
     made: list[Made] = []
-    """Energy created by terms of the energy ledger (``run.made_limit``), the largest first; only terms that have
-    created energy."""
+    """Energy created by each term of the energy ledger (``run.made_limit``), the largest first. Only terms that have
+    created energy are listed."""
     compressed: list[Compressed] = []
-    """Largest compression of each part that breaks in tension only and was compressed; the part with the largest value
-    comes first."""
+    """Largest compression of each part that breaks in tension only and was compressed, the largest first."""
     phases: dict[str, list[float]] = {}
-    """CPU seconds per phase, one number per rank; only the first thread of the rank counts."""
+    """CPU time of each phase, s, one number per rank, without the threads of the rank except the first."""
     serial: dict[str, list[float]] = {}
-    """Serial wall time of each phase, s, one number per rank: work of a single thread of the rank, without waiting for
-    other ranks. The serial wall time limits the gain of more threads. Other programs on the same cores increase the
-    serial wall time."""
+    """Wall time of each phase in which a single thread of the rank works (serial time), s, one number per rank, without
+    waiting for other ranks. The serial time limits the gain by more threads. Other programs on the same cores increase
+    it."""
     parallel: dict[str, list[float]] = {}
-    """Wall time of each phase in parallel regions, whose tasks are divided among the threads of a rank, s. With one
-    thread, this is the time that more threads could share."""
+    """Wall time of each phase in parallel regions (loops whose tasks are divided among the threads of a rank), s, one
+    number per rank. For a run with one thread, more threads can reduce only this time."""
     projected: dict[int, dict[str, list[float]]] = {}
-    """Estimated seconds per phase and rank without waiting, by number of threads; only for a run with this option
-    (docs/performance/scaling.md)."""
+    """Estimated time of each phase on each rank without waiting, s, by the number of threads; only for a run with this
+    option (docs/performance/scaling.md)."""
     sharing: "Sharing | None" = None
-    """Measured times of parallel regions, from which the estimates for other numbers of threads are computed."""
+    """Measured times of the parallel regions, from which ``projected`` is computed."""
     helped: list[float] = []
-    """Working time of all threads of the rank except the first, summed, s; at most threads - 1 times ``parallel``."""
+    """Sum of the working times of all threads of each rank except the first thread, s; at most (threads - 1) times
+    ``parallel``."""
     without: list[str] = []
-    """Stages that the case does not have (cases/estimates/stages.py); no phase has computed these stages."""
+    """Names of the stages that the case does not have (cases/estimates/stages.py); they cost nothing."""
     peak_memory: list[int] = []
-    """Largest resident memory, bytes, one number per rank."""
+    """Largest resident memory of each rank, bytes."""
     element_updates_per_second: float = math.nan
-    """Number of tets times steps, per CPU second and core."""
+    """Number of tets times number of steps, per second of CPU time."""
     reference: list[Check] = []
     probes: list[Measured] = []
     """Last, smallest and largest value of each probe, by the name of the probe."""
@@ -166,12 +171,14 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
 
 
 def known(value: float | None) -> float | None:
-    """A number of an outcome; None if unknown."""
+    """Returns a number of an outcome, or None if it is unknown."""
     return None if value is None or math.isnan(value) else value
 
 
 def last_message(outcome: Outcome) -> dict[str, Any]:
-    """Returns the fields of the message about the outcome (messages.Finished); 0 for unknown values."""
+    """Returns the fields of the message about the end of the run (messages.Finished) from its outcome; 0 for unknown
+    values.
+    """
     steps = outcome.steps or 0
     return {
         "step": steps, "t": known(outcome.time) or 0.0, "state": outcome.state, "digest": outcome.digest,
@@ -185,8 +192,8 @@ def to_json(outcome: Outcome) -> bytes:
 
 
 def from_json(text: bytes | str) -> Outcome:
-    """Reads an outcome. Raises msgspec.ValidationError or msgspec.DecodeError if the data is no outcome. JSON has no
-    NaN, so that NaN is written as null and null is read as NaN.
+    """Reads an outcome. Raises msgspec.ValidationError or msgspec.DecodeError if the text is no outcome. JSON has no
+    NaN: NaN is written as null, and null is read as NaN.
     """
     data = msgspec.json.decode(text)
     if isinstance(data, dict):

@@ -19,7 +19,7 @@ class State(StrEnum):
 
     @property
     def final(self) -> bool:
-        """Whether the state is final, so that it cannot change any more."""
+        """Whether the state is final: the state of the run cannot change any more."""
         return self in FINAL
 
 
@@ -33,8 +33,8 @@ FOLLOWERS: dict[State, frozenset[State]] = {
     State.STOPPING: FINAL,
     **dict.fromkeys(FINAL, frozenset()),
 }
-"""The states that may follow each state; a final state has no follower. An interrupted job of a batch system waits
-again."""
+"""States that may follow each state; none follows a final state. The job of a run that was interrupted waits in the
+queue of the batch system again."""
 
 
 class Cause(StrEnum):
@@ -57,8 +57,8 @@ class Cause(StrEnum):
 
 
 class ExitCode:
-    """Exit codes of ``python -m conoid.worker``. The outcome file decides how a run has ended; the exit code is only
-    additional information.
+    """Exit codes of ``python -m conoid.worker``. The exit code is additional information only: the outcome file gives
+    the end of the run.
     """
 
     SUCCEEDED = 0
@@ -67,4 +67,4 @@ class ExitCode:
     PHYSICS = 3
     INTERRUPTED = 4
     STORAGE = 5
-    """Cause: a file could not be written, because the disk is full or defective."""
+    """A file could not be written: the disk is full or defective."""

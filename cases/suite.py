@@ -1,4 +1,4 @@
-"""The suite of hard cases: the table of the cases, and the check of a run of a case."""
+"""The suite of hard cases: the list of its cases, and the check of their runs."""
 
 import math
 import tomllib
@@ -13,9 +13,9 @@ from .outcome import Outcome
 
 _TABLE = Path(__file__).with_name("hard.toml")
 RESIDUAL, DRIFT = 0.01, 1e-9
-"""Largest energy residual of a correct run, and largest drift of the momentum divided by the sum of |m v| of the parts
-(chosen values). The limits of the catalogue are 1 % for the energy and 1e-10 for the momentum of a single body; sums of
-impulses are rounded."""
+"""Largest energy residual of a correct run, and largest drift of the momentum divided by the sum of |m v| over the
+parts (chosen values). The second value is above rounding errors of single bodies (1e-10), because sums of impulses are
+rounded, too."""
 
 
 @dataclass(frozen=True)
@@ -25,13 +25,13 @@ class Hard:
     name: str
     rows: tuple[str, ...]
     case: str
-    """Name of a shipped case, or of a case file in cases/hard."""
+    """Name of a shipped case, or of a case file in the folder cases/hard."""
     changes: tuple[str, ...] = ()
     limit: float = RESIDUAL
     """Limit of the energy residual of the case."""
     refused: str = ""
-    """Term of the energy ledger that is known to create more energy than ``run.made_limit``, so that the run ends. If
-    the term is empty, the run must succeed."""
+    """Term of the energy ledger that is expected to create more energy than ``run.made_limit`` allows, so that the run
+    fails. Empty: the run must succeed."""
 
     @property
     def path(self) -> Path:
@@ -40,7 +40,7 @@ class Hard:
 
 
 def suite() -> list[Hard]:
-    """Every case of the suite, in the order of the table."""
+    """Returns the cases of the suite in the order of the list."""
     listed = tomllib.loads(_TABLE.read_text(encoding="utf-8"))["hard"]
     return [
         Hard(
@@ -52,15 +52,15 @@ def suite() -> list[Hard]:
 
 
 def is_free(case: Case) -> bool:
-    """Whether no external force acts on the scene, so that the momentum, including that of deleted nodes, is
+    """Whether no external force acts in the case, so that the momentum, including that of deleted nodes, is
     constant.
     """
     return not case.boundaries
 
 
 def drift(case: Case, momenta: Sequence[tuple[float, float, float]]) -> float:
-    """Largest change of the momentum of a free case, divided by the sum of sqrt(2 m E) of the parts; NaN without
-    motion.
+    """Largest change of the momentum during the run, divided by the sum of sqrt(2 m E) over the parts (m: mass, E:
+    kinetic energy); NaN without motion.
     """
     brought = [part.bulk for part in estimate(case).parts if part.bulk is not None]
     scale = math.fsum(math.sqrt(2.0 * bulk.mass * bulk.energy) for bulk in brought)
@@ -70,7 +70,7 @@ def drift(case: Case, momenta: Sequence[tuple[float, float, float]]) -> float:
 
 
 def faults(hard: Hard, outcome: Outcome, drifted: float | None) -> list[str]:
-    """Yields the errors of a run of the case; a correct run has no errors."""
+    """Yields what is wrong with a run of the case; nothing for a correct run."""
     found = []
     if hard.refused:
         if outcome.cause != "energy" or f"the term {hard.refused} of the energy ledger" not in outcome.message:

@@ -1,13 +1,13 @@
-"""Physical quantities as text: ``"210 m/s"`` becomes 210.0 in SI.
+"""Physical quantities as text: ``"210 m/s"`` becomes 210.0 in SI units.
 
-The grammar is closed (no evaluation of any kind)::
+The grammar (no part of the text is executed)::
 
     quantity = number [ unit { ("*" | "/" | " ") unit } ]
     unit     = symbol [ "^" integer ]
 
-A number without a unit is taken as a value in SI. Factors are exact and a quantity is rounded once: ``0.4 mm`` and
-``400 um`` give the same bit pattern, and therefore the same run. Errors contain the text of the quantity, the reason,
-and the allowed form.
+A number without a unit is taken as a value in SI. Factors of units are exact and a quantity is rounded only once: ``0.4
+mm`` and ``400 um`` are the same number, and give the same run. The text of an error has the quantity, what is wrong
+with it, and what is allowed.
 """
 
 import math
@@ -27,14 +27,14 @@ Dimension = tuple[int, int, int, int]
 _LENGTH, _MASS, _TIME, _TEMPERATURE = (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)
 _FORCE, _STRESS, _ENERGY, _POWER = (1, 1, -2, 0), (-1, 1, -2, 0), (2, 1, -2, 0), (2, 1, -3, 0)
 _NONE, _FREQUENCY = (0, 0, 0, 0), (0, 0, -1, 0)
-"""Dimensions of the units: exponents of m, kg, s, K."""
+"""Dimensions of plain numbers and of frequencies: exponents of metre, kilogram, second and kelvin."""
 
 _ONE, _KILO, _MEGA, _GIGA = Fraction(1), Fraction(1000), Fraction(10**6), Fraction(10**9)
 _CENTI, _MILLI, _MICRO = Fraction(1, 100), Fraction(1, 1000), Fraction(1, 10**6)
 _NANO, _PICO = Fraction(1, 10**9), Fraction(1, 10**12)
-"""SI prefixes with their exact factors."""
+"""SI prefixes as exact factors."""
 _INCH, _POUND = Fraction("0.0254"), Fraction("0.45359237")
-"""Inch and pound in m and kg; exact by the international agreement of 1959."""
+"""Inch in m and pound in kg; exact by the international agreement of 1959."""
 _PSI = _POUND * Fraction("9.80665") / _INCH**2
 """Pound-force per square inch, Pa; exact, with standard gravity."""
 UNITS: dict[str, tuple[Fraction, Dimension]] = {
@@ -66,26 +66,27 @@ KINDS: dict[Dimension, str] = {
     (2, 0, 0, 0): "an area", (0, 1, -2, 0): "an energy per area",
     (2, 1, 0, 0): "a moment of inertia",
 }  # fmt: skip
-"""Name of the quantity of each dimension."""
+"""Words for a quantity of each dimension."""
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
 NUMBER = r"^\s*[+-]?(\d+\.?\d*|\.\d+)"
-"""Start of the text of a quantity, as a pattern for the JSON schema."""
+"""Pattern of the beginning of the text of a quantity, for the JSON schema."""
 _FACTOR = re.compile(r"\s*([*/·]?)\s*([A-Za-zµ%]+|1)(?:\^([+-]?\d))?")
 QUANTITY = "the quantity's"
-"""Placeholder for the unit of a number if another key determines the unit."""
+"""Text that stands for the unit of a key whose unit depends on another key."""
 _LONGEST = 80
-"""Largest number of characters of a quantity (chosen value). Any number with its unit is shorter than this limit. A
-longer text is refused before it is parsed as a quantity."""
+"""Largest number of characters of a quantity (chosen value); every sensible number with its unit is shorter. A longer
+text is refused before it is read as a quantity."""
 LARGEST = 1e30
-"""Largest quantity in SI units; the smallest quantity is its inverse. The energy of any mass and speed below this limit
-is a finite number (reason of the chosen value)."""
+"""Largest quantity in SI units; the smallest quantity is its inverse. With quantities below this limit the kinetic
+energy of any mass and speed is a finite number (reason of the chosen value)."""
 
 
 _WRITTEN = str.maketrans({
     "\N{GREEK SMALL LETTER MU}": "\N{MICRO SIGN}", "\N{SUPERSCRIPT TWO}": "^2", "\N{SUPERSCRIPT THREE}": "^3",
 })  # fmt: skip
-"""Two other spellings of units are accepted: the Greek mu for the micro sign, and raised exponents."""
+"""Other characters that are accepted in units: the Greek letter mu for the micro sign, and raised digits for exponents.
+"""
 
 
 def parse_unit(text: str) -> tuple[Fraction, Dimension]:
@@ -110,7 +111,8 @@ def parse_unit(text: str) -> tuple[Fraction, Dimension]:
 
 
 def parse_quantity(value: object, unit: str) -> float:
-    """Returns the SI value of ``value``, a number (already SI) or text with a unit of the same dimension as ``unit``.
+    """Returns the value of a quantity in SI units. ``value``: a number, which is already in SI units, or a text with a
+    unit of the same dimension as ``unit``.
 
     Raises ValueError if the dimension differs, if the unit is unknown, for NaN and infinity, and for values beyond
     LARGEST or below its inverse.
@@ -124,8 +126,8 @@ def parse_quantity(value: object, unit: str) -> float:
 
 
 def written(value: object) -> tuple[str, str] | None:
-    """Returns number and unit of a quantity as they are written, with an empty unit if there is none; None for other
-    text. The function does not check that the unit exists.
+    """Returns the number and the unit of a quantity as they are written; the unit is empty if there is none. The result
+    is None for other text. The function does not check whether the unit exists.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         return None
@@ -134,8 +136,8 @@ def written(value: object) -> tuple[str, str] | None:
 
 
 def usable(number: float, what: str = "it") -> float:
-    """Returns the number if it is between the inverse of LARGEST and LARGEST. Raises ValueError for any other number;
-    ``what``: words for the number in the error message.
+    """Returns ``number`` if its absolute value is 0 or between the inverse of LARGEST and LARGEST. Raises ValueError
+    for any other number. ``what``: words for the number in the message.
     """
     if number and not 1.0 / LARGEST <= abs(number) <= LARGEST:
         raise ValueError(f"{what} is not between {1.0 / LARGEST:g} and {LARGEST:g}")
@@ -165,7 +167,8 @@ def _read_text(text: str, unit: str) -> float:
 
 def kind_of(unit: str) -> str:
     """Returns the words for a quantity in ``unit``, such as ``a length, in a unit such as 'm'``, for an error
-    message."""
+    message.
+    """
     kind = "an angle" if unit == "rad" else KINDS.get(parse_unit(unit)[1], "a quantity")
     return f"{kind}, in a unit such as {unit!r}" if unit else kind
 
@@ -179,7 +182,9 @@ def _reader(unit: str) -> BeforeValidator:
 
 @dataclass(frozen=True)
 class Written:
-    """Addition to the JSON schema of a key: a number, or text with a unit; ``unit``: the SI unit of a bare number."""
+    """Addition to the JSON schema of a key whose value is a number or a text with a unit. ``unit``: unit of a number
+    without a unit.
+    """
 
     unit: str
 

@@ -1,4 +1,4 @@
-"""Checks of bonds that the models cannot make: existing parts, keys that need each other, meshes."""
+"""Checks of the bonds of a case that involve several tables: names of parts, keys that need each other, meshes."""
 
 from collections.abc import Iterator
 
@@ -38,8 +38,8 @@ def _each(case: Case) -> Iterator[Problem]:
 
 
 def _pulled(case: Case) -> Iterator[Problem]:
-    """Yields a problem for gravity on only some parts of a body: a node of the interface has one acceleration for all
-    of its mass.
+    """Yields a problem for gravity that acts on only some parts of a body: each node of the interface belongs to
+    several parts and can have only one acceleration.
     """
     body = bodies(case)
     for k, spec in enumerate(case.boundaries):

@@ -1,5 +1,5 @@
-"""Checks of boundaries that the models cannot make: existing parts, boxes that contain nodes or faces, walls in front
-of parts.
+"""Checks of the boundaries of a case that involve several tables: names of parts, boxes without nodes or faces, bodies
+behind walls.
 """
 
 import itertools
@@ -41,8 +41,9 @@ def check_boundaries(case: Case) -> Iterator[Problem]:
 
 
 def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
-    """Yields a problem for a plane or a box outside of all bodies of the boundary, and for the box of a traction that
-    is completely inside of a body. The worker checks boxes that lie between the nodes of a body.
+    """Yields a problem for a plane or a box that contains no body of the boundary, and for a traction whose box lies
+    completely inside a body. The function cannot find a box that lies between the nodes of a body; the worker reports
+    such a box.
     """
     boundary = case.boundaries[number]
     parts = [part for part in case.parts if not boundary.parts or part.name in boundary.parts]
@@ -88,8 +89,8 @@ def _meet(box: list[tuple[float, float]], body: tuple[Vector, Vector]) -> bool:
 
 
 def _surrounds(body: Placed, box: list[tuple[float, float]]) -> bool:
-    """Whether a box lies in a body, tested at the corners of the box, which is exact for bodies without hole and
-    slit.
+    """Whether the box lies inside the body. The function tests the corners of the box. This test is exact for bodies
+    without holes and slits.
     """
     if isinstance(body.mesh, Tube) or (isinstance(body.mesh, Box | Plate) and body.mesh.slit is not None):
         return False
@@ -98,8 +99,8 @@ def _surrounds(body: Placed, box: list[tuple[float, float]]) -> bool:
 
 
 def _comes(case: Case, part: Part, axis: int, way: float) -> bool:
-    """Whether a part moves along ``axis`` to the boundary ``target`` by the displacement ``way``, m, as far as the
-    motion is known.
+    """Whether the part may move along ``axis`` in the direction of the sign of ``way``. The result is true if the
+    motion of the part is unknown or driven.
     """
     pulls = [boundary.acceleration[axis] for boundary in case.boundaries if isinstance(boundary, Gravity)]
     unknown = part.spin is not None or part.stretch is not None or part.jitter > 0.0
@@ -108,8 +109,8 @@ def _comes(case: Case, part: Part, axis: int, way: float) -> bool:
 
 
 def _two_drives(case: Case) -> Iterator[Problem]:
-    """Yields a problem for two boundaries that prescribe different motions of a whole part; the worker checks the nodes
-    of boxes.
+    """Yields a problem for two boundaries that prescribe different motions of a whole part. The worker checks
+    boundaries with boxes, because it has the nodes.
     """
     drives = [(i, each) for i, each in enumerate(case.boundaries) if isinstance(each, Rotation) or _whole(each)]
     drives = [(i, each) for i, each in drives if getattr(each, "on", None) is None]
@@ -179,8 +180,8 @@ def ordered(low: tuple[float, ...], high: tuple[float, ...], location: Location)
 
 
 def check_walls(case: Case) -> Iterator[Problem]:
-    """Yields a problem for walls with the same name, for a wall without a normal, and for a part behind a wall at the
-    start.
+    """Yields a problem for two walls with the same name, for a wall without a normal, and for a part that starts behind
+    a wall.
     """
     walls = [(i, boundary) for i, boundary in enumerate(case.boundaries) if isinstance(boundary, Wall)]
     seen: set[str] = set()
@@ -195,7 +196,9 @@ def check_walls(case: Case) -> Iterator[Problem]:
 
 
 def _shape(wall: Wall, location: Location) -> Iterator[Problem]:
-    """Yields the keys of a wall that its shape requires but the case lacks, or that its shape does not have."""
+    """Yields a problem for each key that the shape of a wall needs and the case lacks, and for each key that the shape
+    does not have.
+    """
     needed = {"plane": ("normal",), "cylinder": ("axis", "radius"), "sphere": ("radius",)}[wall.shape]
     for key in ("normal", "axis", "radius"):
         value = getattr(wall, key)

@@ -1,6 +1,4 @@
-"""Checks between the keys of a case, which the models cannot make: existing names, sizes that fit, required planes of
-symmetry.
-"""
+"""Checks that involve several tables of a case: names, sizes that fit each other, boundaries that a sector needs."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -42,7 +40,8 @@ NEEDED: dict[str, frozenset[str]] = {
     "penetration": frozenset({"part", "axis"}),
     "worst_residual": frozenset(),
 }
-"""Keys that each reference quantity needs. A reference quantity refuses all other keys of part, probe and axis."""
+"""The keys that each reference quantity needs. A reference must not have any other of the keys ``part``, ``probe`` and
+``axis``."""
 
 Read = TypeVar("Read", bound=BaseModel)
 
@@ -57,7 +56,7 @@ def check(case: Case) -> list[Problem]:
 
 
 def check_parts(data: Mapping[str, Any]) -> Iterator[Problem]:
-    """Yields the problems of the parts of a case if other keys of the case have errors: materials, sizes, overlap."""
+    """Yields the problems of the parts of a case that has errors in other tables: materials, sizes, overlap."""
     listed, own = data.get("parts"), data.get("materials")
     known = {*library(), *(own if isinstance(own, Mapping) else ())}
     parts: list[tuple[int, Part]] = []
@@ -75,7 +74,9 @@ def check_parts(data: Mapping[str, Any]) -> Iterator[Problem]:
 
 
 def _tied(bonds: object) -> dict[frozenset[str], float]:
-    """Names of the bonded parts; the overlap of bonded parts is checked after the case has been read."""
+    """Returns an infinite allowed overlap for each pair of bonded parts, by their names: the overlap of bonded parts is
+    checked after the whole case has been read.
+    """
     listed = bonds if isinstance(bonds, list | tuple) else ()
     names = [each.get("parts") for each in listed if isinstance(each, Mapping)]
     pairs = [pair for pair in names if isinstance(pair, list | tuple) and all(isinstance(name, str) for name in pair)]
@@ -130,7 +131,7 @@ def _parts(case: Case) -> Iterator[Problem]:
 
 
 def _erosion(spec: Erosion, name: str, law: Strength | None, location: Location) -> Iterator[Problem]:
-    """Yields a problem for erosion limits that the material of a part can never reach."""
+    """Yields a problem for each erosion limit that the material of the part can never reach."""
     if law is None and spec.plastic_strain is not None:
         message = f"{name} is elastic (no table strength) and has no plastic strain; remove the key"
         yield problem((*location, "plastic_strain"), spec.plastic_strain, message)
@@ -172,7 +173,7 @@ def _sectors(case: Case) -> Iterator[Problem]:
 
 
 def _cuts(mesh: Mesh) -> Iterator[tuple[int, float]]:
-    """Planes at which a body is cut by its sector: directions and coordinates, m."""
+    """Planes in which the sector cuts the body: direction and coordinate, m, of each plane."""
     if isinstance(mesh, Solid):
         yield from ((d, mesh.centre[d]) for d in cut_by(mesh.sector, mesh.axis))
     elif not isinstance(mesh, Measured):

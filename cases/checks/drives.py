@@ -1,17 +1,22 @@
-"""Prescribed motion: the components that a boundary prescribes, and conflicts between two boundaries."""
+"""Prescribed motions: the velocity components that a boundary prescribes, and the components for which two boundaries
+disagree.
+"""
 
 from ..model.boundaries import Boundary, Course, Prescribed, Rotation
 from ..model.tables import Axis
 from ..shapes.geometry import AXES, across
 
 Motion = tuple[object, ...]
-"""Motion of a velocity component over time; two motions are equal if the tuples are equal."""
+"""Prescribed velocity component as a function of time, as a tuple that can be compared: equal tuples mean equal
+motions."""
 REST: Motion = (0.0,)
-"""Motion of a velocity component that stays zero."""
+"""Motion of a velocity component that is always 0."""
 
 
 def motions(boundary: Boundary) -> dict[Axis, Motion]:
-    """Returns the motion of each velocity component that a boundary prescribes; empty without prescribed motion."""
+    """Returns the motion of each velocity component that the boundary prescribes; the result is empty if the boundary
+    prescribes none.
+    """
     if isinstance(boundary, Prescribed):
         given = {axis: getattr(boundary, axis) for axis in AXES}
         return {axis: _straight(speed, boundary.course) for axis, speed in given.items() if speed is not None}
@@ -21,7 +26,7 @@ def motions(boundary: Boundary) -> dict[Axis, Motion]:
 
 
 def clash(one: Boundary, other: Boundary) -> tuple[Axis, ...]:
-    """Returns the velocity components for which two boundaries prescribe different motions: a node cannot follow
+    """Returns the velocity components for which the two boundaries prescribe different motions: a node cannot have
     both.
     """
     first, second = motions(one), motions(other)
@@ -33,7 +38,9 @@ def _straight(speed: float, course: Course) -> Motion:
 
 
 def _round(boundary: Rotation, axis: Axis) -> Motion:
-    """Returns the motion of a rotation; the component along its axis is zero."""
+    """Returns the motion of the velocity component along ``axis`` in a rotation; the component along the axis of the
+    rotation is 0.
+    """
     i, j = across(axis)
     rate = boundary.spin.rate
     return (boundary.spin.centre, rate) if rate[i] or rate[j] else REST

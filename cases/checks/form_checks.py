@@ -1,4 +1,4 @@
-"""Checks of a shape that its model cannot make: sizes that fit each other."""
+"""Checks of the sizes of a shape against each other."""
 
 from collections.abc import Iterator
 
@@ -8,8 +8,8 @@ from ..reading.problems import Location, Problem, problem
 from ..shapes.profile import tangent
 
 _LEAST = 1e-6
-"""Smallest size divided by the radius of a body (chosen value); a smaller size, except 0, is an error. No element is as
-small as this size."""
+"""Smallest allowed size of a detail, divided by the radius of its body (chosen value). A smaller size, except 0, is an
+error. No mesh resolves a smaller detail."""
 _ROUNDED = "shank", "tip_radius", "meplat", "top_radius", "inner_radius", "radius"
 
 
@@ -32,7 +32,7 @@ def check_form(form: Model, location: Location) -> Iterator[Problem]:
 
 
 def _slips(form: Model, location: Location) -> Iterator[Problem]:
-    """Yields lengths that may be 0 and that are nearly 0."""
+    """Yields a problem for each length that may be 0, is not 0, and is too small for any mesh."""
     if not isinstance(form, ConeForm | OgiveForm | RingSectorForm):
         return
     most = max(form.radius, form.top_radius) if isinstance(form, ConeForm) else form.radius

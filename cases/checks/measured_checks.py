@@ -1,4 +1,6 @@
-"""Checks of a body with measured sizes (combination, CAD, STL, mesh file), and of the files that the body names."""
+"""Checks of bodies whose sizes are measured on their mesh (combination, CAD, STL, mesh file), and of the files that
+these bodies name.
+"""
 
 from collections.abc import Iterator
 
@@ -9,11 +11,11 @@ from ..reading.problems import Location, Problem, problem
 from .form_checks import check_form
 
 _DEEPEST, _MOST = 8, 200
-"""Largest depth of nested combinations, and largest number of shapes in a combination: larger than any user needs
-(chosen values)."""
+"""Largest depth of nested combinations, and largest number of shapes in a combination (chosen values, larger than
+practical models need)."""
 
 File = MeshFile | FileForm | Stl
-"""Models that name a file by the keys ``path`` and ``sha256``."""
+"""Tables of a mesh that name a file by the keys ``path`` and ``sha256``."""
 
 
 def files_in(mesh: Mesh) -> Iterator[tuple[Place, File]]:

@@ -1,4 +1,4 @@
-"""Checks of a mesh that its model cannot make: sizes that fit, slits on planes of nodes."""
+"""Checks of a mesh that involve several of its keys: sizes that fit each other, slits on planes of nodes."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -41,7 +41,9 @@ def check_mesh(mesh: Mesh, location: Location) -> Iterator[Problem]:
 
 
 def missing_files(parts: Iterable[Mesh], folder: Path) -> Iterator[Problem]:
-    """Yields a problem for each file of the ``parts`` that does not exist, relative to the ``folder`` of the case."""
+    """Yields a problem for each missing file of the ``parts``. Relative paths start in ``folder``, the folder of the
+    case.
+    """
     for i, mesh in enumerate(parts):
         for place, file in files_in(mesh):
             path = located(file.path, file.sha256, folder)

@@ -1,5 +1,5 @@
-"""Sets of mesh files that boundaries and probes select by the key ``on``, and sets that frames contain: numbers and
-parts of the sets.
+"""Sets of mesh files that boundaries, probes (key ``on``) and frames (key ``run.sets``) use: the number of each set,
+and the parts that have it.
 """
 
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ from ..model.schema import Case, Part
 from ..reading.problems import Location, Problem, problem
 
 MOST = 62
-"""Largest number of sets of a case: each node has one bit for each set in an integer of 64 bits."""
+"""Largest number of sets of a case: a 64-bit integer per node has one bit for each set."""
 
 
 class Framed(NamedTuple):
@@ -23,14 +23,14 @@ class Framed(NamedTuple):
 
 
 Held = Prescribed | Rotation | Symmetry | Traction
-"""Kinds of boundaries that may have a set."""
+"""Kinds of boundaries that may select a set."""
 Selecting = Held | Probe | Framed
 """Every object of a case that may select a set."""
 
 
 def ons(case: Case) -> list[tuple[Location, Selecting]]:
-    """Returns the boundaries and probes that select a set, and the sets of frames, each with the location of the set's
-    name in the case.
+    """Returns every boundary, probe and frame setting that selects a set, with the location of the key that names the
+    set.
     """
     boundaries: list[tuple[Location, Selecting]] = [
         (("boundaries", i, "on"), each)
@@ -47,21 +47,21 @@ def bits(case: Case) -> dict[str, int]:
 
 
 def named(spec: Selecting) -> tuple[str, ...]:
-    """Returns the parts that a boundary or a probe names."""
+    """Returns the names of the parts that the boundary or probe names."""
     return ((spec.part,) if spec.part else ()) if isinstance(spec, Probe) else spec.parts
 
 
 def parts(case: Case, spec: Selecting) -> list[Part]:
-    """Returns the parts whose sets a boundary or probe selects: the named parts, or all parts with a mesh file if no
-    part is named.
+    """Returns the parts whose sets the boundary or probe selects: the named parts; if it names no part, all parts with
+    a mesh file.
     """
     names = named(spec)
     return [part for part in case.parts if (part.name in names if names else isinstance(part.mesh, MeshFile))]
 
 
 def check_ons(case: Case) -> Iterator[Problem]:
-    """Yields a problem for each boundary, probe or frame that selects a set of a part without sets; only mesh files
-    have sets.
+    """Yields a problem for each boundary, probe or frame setting that selects a set of a part without sets. Only mesh
+    files have sets.
     """
     for location, spec in ons(case):
         generated = [part.name for part in parts(case, spec) if not isinstance(part.mesh, MeshFile)]

@@ -1,4 +1,4 @@
-"""Overlap of primitives, checked before meshes are made."""
+"""Overlap of parts, found from their shapes before there are meshes."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -15,14 +15,14 @@ from ..shapes.placed import Placed, lattice
 from ..shapes.profile import Revolved, profile
 
 _POINTS = 12
-"""Number of sampling points per direction in the common bounding box of two bodies (chosen value). The worker, which
-checks the nodes, finds overlaps that are thinner than a twelfth of this box."""
+"""Number of sampling points per direction in the common bounding box of two bodies (chosen value). Overlaps thinner
+than a twelfth of this box may be missed; the worker finds them, because it tests the nodes."""
 _PAIRS = 32
-"""Largest number of pairs of bodies that are checked: a second at most (chosen value). The worker checks all pairs of
-bodies."""
+"""Largest number of pairs of bodies that this module checks; the check then takes a second at most (chosen value). The
+worker checks all pairs."""
 _TOUCH = 1e-9
-"""Depth of contact that does not count as an overlap, divided by the size of a body. The depth is far above rounding
-errors and far below any gap (chosen value)."""
+"""Largest depth, divided by the size of a body, that counts as touching and not as overlap. The limit is far above
+rounding errors and far below any gap of a model (chosen value)."""
 
 
 def overlaps(
@@ -30,9 +30,9 @@ def overlaps(
 ) -> Iterator[Problem]:
     """Yields a problem for each of the numbered ``parts`` that overlaps an earlier part with which it is in contact.
 
-    ``tied``: allowed overlap of two parts with a tied bond, m, by the names of the parts; tied nodes are moved onto the
-    faces of the other part. Curved bodies are reduced by the depth that the facets of their mesh can cut off; single
-    tets and mesh files are ignored.
+    ``tied``: allowed overlap of two parts with a tied bond, m, by the names of the parts. Two tied parts may overlap
+    because the tied nodes are moved onto the faces of the other part. Each curved body is first reduced by the depth
+    that the facets of its mesh can cut off. Single tets and mesh files are not checked.
     """
     if contact is None or contact.overlap != "refuse":
         return
@@ -54,7 +54,9 @@ def overlaps(
 
 
 def bond_gaps(case: Case) -> dict[frozenset[str], float]:
-    """Returns the allowed overlap of two parts with a tied bond, m, by the names of the parts: the gap of the bond."""
+    """Returns the allowed overlap of each pair of parts with a tied bond, m, by the names of the parts: the ``gap`` of
+    the bond.
+    """
     sizes = {part.name: getattr(part.mesh, "element_size", math.inf) for part in case.parts}
     found = dict[frozenset[str], float]()
     for bond in case.bond:
@@ -65,9 +67,10 @@ def bond_gaps(case: Case) -> dict[frozenset[str], float]:
 
 
 def grazes(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each part that fills the hole of another part within the depth of the facets of the tube.
-    Two circles of the same radius become polygons that overlap. Parts of one body have common facets, and tied nodes
-    are moved onto the faces.
+    """Yields a warning for each part whose radius equals that of the hole around it, except for a difference below the
+    depth that facets cut off. The meshes of such parts overlap, because their circles become polygons with different
+    corners. Two parts of one body give no warning, because they have common facets; two tied parts give none, because
+    tied nodes are moved onto the faces.
     """
     contact, body = case.contact, bodies(case)
     if contact is None or contact.overlap != "refuse":
@@ -97,7 +100,7 @@ def grazes(case: Case) -> Iterator[Problem]:
 
 
 def _core(mesh: Generated) -> Generated:
-    """Returns a body reduced by the depth that facets of its element size can cut off its curved surface."""
+    """Returns the body reduced by the depth that facets of its element size can cut off its curved surface."""
     if not isinstance(mesh, Cylinder | Tube | Sphere):
         return mesh
     left = max(0.5 * mesh.radius, mesh.radius - _cut_off(mesh.radius, mesh.element_size))
@@ -113,12 +116,12 @@ def _rim(mesh: Generated) -> float:
 
 
 def _cut_off(radius: float, size: float) -> float:
-    """Returns the height of the arc above a chord of the length ``size``, m: h^2 / 8 R."""
+    """Returns the height of the arc above a chord of length ``size``, m: size^2 / (8 radius)."""
     return size**2 / (8.0 * radius)
 
 
 def _common(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> tuple[Vector, Vector] | None:
-    """Returns the common box of two bodies with the given corners."""
+    """Returns the box that the bounding boxes of two bodies have in common; None if they do not overlap."""
     (low, high), (low2, high2) = one, other
     (a, b, c), (d, e, f) = map(max, low, low2), map(min, high, high2)
     size = max(y - x for x, y in zip(low + low2, high + high2, strict=True))
@@ -126,8 +129,8 @@ def _common(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> tuple[V
 
 
 def _round(point: Vector, margin: float) -> Iterator[Vector]:
-    """Returns six points around a point. Six points are needed because, where turned bodies touch, rounding can put the
-    middle point inside both bodies.
+    """Returns six points around a point. Where turned bodies touch, rounding can put the point itself inside both
+    bodies; the six points around it are then not all inside.
     """
     x, y, z = point
     for off in (-margin, margin):
@@ -135,7 +138,7 @@ def _round(point: Vector, margin: float) -> Iterator[Vector]:
 
 
 def _depth(one: Placed, other: Placed, low: Vector, high: Vector) -> float:
-    """Returns the smallest extent, m, of the common volume of two bodies in a box; 0 if there is no common volume."""
+    """Returns the smallest extent, m, of the volume that two bodies have in common inside a box; 0 if there is none."""
     both = [point for point in lattice(low, high, _POINTS) if one.holds(point) and other.holds(point)]
     margin = _TOUCH * max(b - a for body in (one, other) for a, b in zip(*body.bounds(), strict=True))
     margin = max(margin, _rim(one.mesh), _rim(other.mesh))

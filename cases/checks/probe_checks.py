@@ -1,4 +1,4 @@
-"""Checks of probes that the models cannot make: existing parts and walls, keys that a field needs or does not use."""
+"""Checks of probes that involve several tables: names of parts and walls, keys that a field needs or does not use."""
 
 from collections.abc import Iterator
 
@@ -20,9 +20,9 @@ _USED: dict[str, tuple[str, ...]] = {
     "at": _HOLES,
     "centre": (*_HOLES, "cone_angle"),
 }
-"""Probe fields for which each key is allowed, by key."""
+"""The probe fields that may have a key, by key."""
 _NEEDED: dict[str, tuple[str, ...]] = {"wall": COURSES, "beyond": BEYOND, "axis": SHAPES, "at": _HOLES}
-"""Probe fields for which each key is required, by key."""
+"""The probe fields that need a key, by key."""
 
 
 def check_probes(case: Case) -> Iterator[Problem]:
@@ -50,7 +50,9 @@ def check_probes(case: Case) -> Iterator[Problem]:
 
 
 def _keys(probe: Probe, location: Location) -> Iterator[Problem]:
-    """Yields keys that the field of a probe requires but the probe lacks, and keys that the field does not use."""
+    """Yields a problem for each key that the field of the probe needs and the probe lacks, and for each key that the
+    field does not use.
+    """
     field = kind(probe.field)
     for key, fields in _USED.items():
         if field not in fields and getattr(probe, key) is not None:
@@ -67,7 +69,9 @@ def _whole(field: str) -> str:
 
 
 def _part(probe: Probe, parts: list[str], location: Location) -> Iterator[Problem]:
-    """Yields a problem for the part of a probe if it is absent, unknown, or given for a wall."""
+    """Yields a problem for the key ``part`` if it is absent although needed, names no part of the case, or is given for
+    a field of a wall.
+    """
     if kind(probe.field) in COURSES:
         if probe.part:
             yield problem((*location, "part"), probe.part, f"{kind(probe.field)} is that of a wall; remove part")
@@ -79,7 +83,9 @@ def _part(probe: Probe, parts: list[str], location: Location) -> Iterator[Proble
 
 
 def _pushes(case: Case, number: int, probe: Probe) -> Iterator[Problem]:
-    """Yields a problem for a probe of the force of a wall or part that does not exist, or cannot exert a force."""
+    """Yields a problem for a probe of a force if the wall or part that it names does not exist or cannot exert a
+    force.
+    """
     location, names = ("probes", number), [wall.name for _, wall in case.boundaries_of(Wall)]
     if probe.field.startswith("wall_"):
         if not names:

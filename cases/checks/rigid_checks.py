@@ -1,5 +1,5 @@
-"""Checks of rigid parts that the models cannot make: keys that have no effect on rigid parts, and boundaries on some of
-their nodes.
+"""Checks of rigid parts that involve several tables: keys without effect on rigid parts, and boundaries that act on
+only some nodes of a rigid part.
 """
 
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ def check_rigid(case: Case) -> Iterator[Problem]:
 
 
 def _bonds(case: Case) -> Iterator[Problem]:
-    """Yields a problem for a bond between two rigid parts, and for a rigid part with common nodes."""
+    """Yields a problem for a bond between two rigid parts, and for a bond with common nodes to a rigid part."""
     rigid = [case.parts[i].name for i in case.rigid]
     for k, bond in enumerate(case.bond):
         held = [name for name in bond.parts if name in rigid]

@@ -1,5 +1,5 @@
-"""Load balance: the criteria for a new decomposition of the mesh, used by a run and by the replay of the loads of a
-run.
+"""Load balance: the criteria that decide when the mesh is divided among the ranks again (a new decomposition). A run
+uses them, and so does the replay of the recorded loads of a run.
 """
 
 from collections.abc import Sequence
@@ -9,14 +9,14 @@ from itertools import pairwise
 from ..model.schema import Balance
 
 WORK = ("elements", "nodes", "contact", "fracture")
-"""Phases of a step whose work is distributed over the ranks; all other phases wait or write."""
+"""Phases of a time step that count as work of a rank. In all other phases a rank waits or writes files."""
 MOVED = ("elements", "nodes", "contact")
-"""Phases whose work moves with the tets. Fracture is not among these phases: it consists of many small tasks on every
-rank that has a facet to break, for any number of such facets."""
+"""Phases whose work moves to another rank together with the tets. The phase ``fracture`` is absent: its cost is a fixed
+cost on every rank on which a facet breaks, for any number of broken facets."""
 
 
 def lost(loads: Sequence[float]) -> float:
-    """Returns the time of the most loaded rank in excess of the mean time of all ranks."""
+    """Returns the load of the most loaded rank minus the mean load, in the unit of ``loads``."""
     return max(loads) - sum(loads) / len(loads)
 
 
@@ -28,8 +28,8 @@ def imbalance(loads: Sequence[float]) -> float:
 
 @dataclass
 class Guard:
-    """Number of outside nodes of each rank, compared with the number at the last decomposition (the paper's criterion,
-    its fig. 9).
+    """The criterion ``outside``: the number of outside nodes (nodes on the surface) of each rank, compared with the
+    number after the last decomposition (fig. 9 of the paper of Moon, Kim and Lee).
     """
 
     alpha: float
@@ -43,7 +43,7 @@ class Guard:
 
 
 _MOMENTS = 32
-"""Largest number of stored times for which the work since a decomposition is recorded (chosen value)."""
+"""Largest number of stored times of one interval between decompositions (chosen value)."""
 
 
 @dataclass
@@ -51,12 +51,13 @@ class Stretch:
     """The work of each rank since the last decomposition."""
 
     _moments: list[tuple[int, list[float]]] = field(default_factory=list)
-    """Time windows that begin at the decomposition; for each window the steps, and the work of each rank, s."""
+    """Stored times since the decomposition: for each, the number of steps since the decomposition, and the CPU time of
+    each rank since then, s."""
     _apart: float = 0.0
-    """Number of steps between two stored times, except the last time."""
+    """Smallest number of steps between two stored times; only the last time may be closer."""
 
     def add(self, loads: Sequence[float], steps: int) -> None:
-        """Adds the ``loads`` of all ranks, s per step, over some steps."""
+        """Adds ``steps`` steps in which each rank has worked ``loads``, s per step."""
         before = self.work or [0.0] * len(loads)
         now = self.steps + steps, [w + steps * load for w, load in zip(before, loads, strict=True)]
         if len(self._moments) > 1 and self.steps - self._moments[-2][0] < self._apart:
@@ -72,14 +73,16 @@ class Stretch:
 
     @property
     def work(self) -> list[float]:
-        """CPU time of each rank since the last decomposition, s. Waiting that alternates between ranks is not counted
-        as imbalance.
+        """CPU time of each rank since the last decomposition, s. In this sum a wait counts only if one rank has had
+        more work than the others over all steps.
         """
         return self._moments[-1][1] if self._moments else []
 
     @property
     def halves(self) -> tuple[float, float]:
-        """Returns the imbalance in the first half of the steps, and the imbalance in the second half."""
+        """Returns the imbalance (largest work divided by mean work) in the first half of the steps since the
+        decomposition, and that in the second half.
+        """
         if not self._moments:
             return 1.0, 1.0
         half, moments = 0.5 * self.steps, [(0, [0.0] * len(self.work)), *self._moments]
@@ -91,41 +94,41 @@ class Stretch:
 
 @dataclass
 class Trigger:
-    """The decision for a new decomposition, by the policy of a case; all ranks reach the same decision."""
+    """The decision about a new decomposition by the policy of the case; all ranks make the same decision."""
 
     spec: Balance
     cost: float
-    """Cost of the last decomposition, s; before the first decomposition, the cost of a comparable operation."""
+    """Wall time of the last decomposition, s; before the first decomposition, the time of a comparable operation."""
     step: int = 0
     """Number of the time step at which the mesh was last decomposed."""
     stretch: Stretch = field(default_factory=Stretch)
     """Work of each rank since the last decomposition."""
     fruitless: int = 0
-    """Number of consecutive decompositions that saved less time than they cost. Each decomposition that saves less than
-    it costs doubles the lost time that triggers the next decomposition."""
+    """Number of decompositions in a row that have saved less time than they cost. Each of them doubles the lost time
+    from which on the mesh is decomposed again."""
 
     def look(self, loads: Sequence[float], steps: int) -> None:
-        """Adds the ``loads`` of all ranks, s per step, over some steps."""
+        """Adds ``steps`` steps in which each rank has worked ``loads``, s per step."""
         self.stretch.add(loads, steps)
 
     @property
     def lost(self) -> float:
-        """Time lost by imbalance since the last decomposition, s."""
+        """Time that the most loaded rank has worked beyond the mean of all ranks since the last decomposition, s."""
         return lost(self.stretch.work) if self.stretch.steps else 0.0
 
     @property
     def bearable(self) -> float:
-        """Returns the lost time that triggers the next decomposition, s."""
+        """Returns the lost time from which on the mesh is decomposed again, s."""
         return self.cost * 2.0**self.fruitless
 
     @property
     def half_way(self) -> bool:
-        """Whether half of the lost time that triggers a decomposition is reached."""
+        """Whether the lost time has reached half of the value from which on the mesh is decomposed again."""
         return self.lost > 0.5 * self.bearable
 
     def cause(self, step: int, grown: bool) -> str | None:
-        """Returns the reason for a decomposition before ``step``; empty for no decomposition. ``grown``: whether the
-        outside nodes of a rank have grown beyond the limit.
+        """Returns the reason for a decomposition before time step ``step``; None for no decomposition. ``grown``:
+        whether the number of outside nodes of a rank has grown beyond the limit of the policy ``outside``.
         """
         spec = self.spec
         if spec.policy == "never" or step == self.step:
@@ -137,8 +140,8 @@ class Trigger:
         return "time lost exceeds the cost" if self.lost > self.bearable else None
 
     def settle(self, step: int, cost: float, paid: bool = True) -> None:
-        """Resets the counters after a decomposition before ``step`` that took ``cost``, s. ``paid``: whether the
-        previous decomposition has saved its cost.
+        """Resets the counters after a decomposition before time step ``step`` that took ``cost``, s. ``paid``: whether
+        the decomposition before that one has saved its cost.
         """
         self.fruitless = 0 if paid else self.fruitless + 1
         self.step, self.cost, self.stretch = step, cost, Stretch()

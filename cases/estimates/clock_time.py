@@ -1,8 +1,8 @@
-"""Estimate of the wall time of a case on its ranks and threads, from the core time of its stages.
+"""Estimate of the wall time of a case on its ranks and threads, from the CPU time of each stage.
 
-The returned estimate contains its assumptions: the share of the threads, and the efficiency of ranks and threads. The
-constants were measured on few cores; for many cores the gain by threads was only projected
-(docs/performance/scaling.md).
+The result also contains its assumptions: the fraction of the CPU time that threads divide, and the parallel
+efficiencies of ranks and threads. The constants were measured on few cores. The gain by threads on many cores is a
+projection that was not measured (docs/performance/scaling.md).
 """
 
 from collections.abc import Mapping
@@ -15,33 +15,33 @@ SHARED = (TETS, AVERAGED, STRENGTH, STATE)
 """Stages whose loops are divided among the threads of a rank. All other parts of the program are assumed to run on one
 thread."""
 _RANKS = 0.4
-"""Exponent p of the speed of R ranks, R^p: 66 % efficient for 2 ranks, 44 % for 4, 19 % for 16. Measured wall times
-correspond to efficiencies of 62 to 72 % for 2 ranks, 54 % for 4, 14 to 18 % for 16, in scenes of 47,000 to 147,000 tets
-(docs/performance/scaling.md)."""
+"""Exponent p: R ranks are R^p times as fast as one rank. The parallel efficiency is then 66 % for 2 ranks, 44 % for 4
+ranks and 19 % for 16 ranks. Measured wall times in scenes of 47,000 to 147,000 tets correspond to 62 to 72 % for 2
+ranks, 54 % for 4 ranks, and 14 to 18 % for 16 ranks (docs/performance/scaling.md)."""
 _THREAD = 0.15
-"""Cost of each further thread for all threads, assumed: T threads are T / (1 + 0.15 (T - 1)) times as fast as one
-thread in shared loops. The efficiency is 87 % for 2 threads, 69 % for 4, 31 % for 16; docs/performance/scaling.md,
-Threads, has the projections."""
+"""Assumed loss k by each further thread: in loops that threads divide, T threads are T / (1 + k (T - 1)) times as fast
+as one thread, k = 0.15. The parallel efficiency is then 87 % for 2 threads, 69 % for 4 threads and 31 % for 16 threads;
+the section "Threads" of docs/performance/scaling.md has the projections."""
 
 
 @dataclass(frozen=True)
 class ClockTime:
-    """Wall time, s, with one core for each thread, and the assumptions of the estimate."""
+    """Estimated wall time, s, on a machine with one core for each thread, and the assumptions of this estimate."""
 
     seconds: float
     breaking: float
-    """Additional wall time, s, if all material that can break breaks as far as it can."""
+    """Additional wall time, s, if all parts that can fracture break as far as they can."""
     shared: float
-    """Share of the core time that is divided among the threads of a rank."""
+    """Fraction of the CPU time that is divided among the threads of a rank."""
     ranks: float
     """Parallel efficiency of the ranks, 1 for one rank."""
     threads: float
-    """Parallel efficiency of the threads in shared loops."""
+    """Parallel efficiency of the threads in the loops that they divide."""
 
 
 def clock_time(case: Case, costs: Mapping[str, float], breaking: float) -> ClockTime:
-    """Returns the wall time of a case from the core time of its stages, and from the additional core time ``breaking``
-    of fracture.
+    """Returns the wall time of a case. ``costs``: CPU time of each stage, s; ``breaking``: additional CPU time of
+    fracture, s.
     """
     ranks, threads = case.run.ranks, case.run.threads
     total = sum(costs.values())

@@ -1,5 +1,5 @@
-"""Number of cores that this process may use, by its CPU affinity and by the CPU quota of its control groups. Number of
-threads of a run whose case gives none.
+"""The cores that this process may use, by its CPU affinity and by the CPU quota of its control groups, and the number
+of threads of a run whose case gives none.
 """
 
 import os
@@ -8,20 +8,21 @@ from pathlib import Path
 from ..model.run import MOST_THREADS
 
 _TETS = 3_000
-"""Smallest number of tets for each thread: eight colours (8 to 10 in bodies of gmsh) of a chunk of 376 tets. With fewer
-tets a thread has no chunk in most colours."""
+"""Smallest number of tets for each thread. The tets of a rank have eight colours (8 to 10 in meshes of gmsh), and a
+thread works on chunks of 376 tets of one colour. With fewer tets per thread, most colours have fewer chunks than there
+are threads."""
 _GROUPS, _OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 
 
 def usable_cores() -> int:
-    """Returns the number of usable cores, at least one; the machine can have more cores."""
+    """Returns the number of cores that this process may use, at least one; the machine can have more."""
     quotas = _quotas(_GROUPS, _OWN)
     return max(1, min([len(core_numbers()), *(int(quota) for quota in quotas)]))
 
 
 def threads_of(ranks: int, cores: int, tets: int | None = None) -> int:
-    """Returns the threads of each of ``ranks`` ranks with which a run uses all ``cores``, and no more than its number
-    of tets can occupy; None: the number of tets is unknown.
+    """Returns the number of threads of each of ``ranks`` ranks so that a run uses all ``cores``, but no more threads
+    than its number of tets can occupy. ``tets``: None if the number is unknown.
     """
     most = MOST_THREADS if tets is None else -(-tets // (_TETS * ranks))
     return max(1, min(cores // ranks, most, MOST_THREADS))
@@ -35,9 +36,9 @@ def core_numbers() -> list[int]:
 
 
 def _quotas(groups: Path, own: Path) -> list[float]:
-    """Yields the CPU quota, in cores, of each control group of a process that has a quota: cpu.max of version 2,
-    cpu.cfs_quota_us of version 1. The root group is included, because it is the group of the container inside of a
-    container.
+    """Yields the CPU quota, in cores, of each control group of a process that has a quota: from cpu.max in version 2 of
+    control groups, from cpu.cfs_quota_us in version 1. The root group is included, because inside of a container it is
+    the group of the container.
     """
     found = []
     for line in _text(own).splitlines():
@@ -54,7 +55,7 @@ def _quota(group: Path) -> float | None:
     if not words:
         words = [_text(group / f"cpu.cfs_{name}_us").strip() for name in ("quota", "period")]
     if len(words) != 2 or not all(word.isdigit() for word in words) or int(words[1]) == 0:
-        return None  # "max" and -1 mean no limit
+        return None  # "max" and -1 mean that the group has no limit
     return int(words[0]) / int(words[1])
 
 

@@ -1,7 +1,7 @@
-"""Estimate of the cost of a case before a run: tets, time step, steps, memory, core time.
+"""Estimate of the cost of a case before it runs: number of tets, time step, number of steps, memory, CPU time.
 
-Numbers of tets are exact for the structured generator and within about 10 % for gmsh; numbers of steps are within a
-factor of two. The core time depends on the constants of this module, which were measured on one machine.
+The number of tets is exact for the structured generator and within about 10 % for gmsh; the number of steps is within a
+factor of two. The CPU time depends on the constants of this module, which were measured on one machine.
 """
 
 import math
@@ -24,68 +24,70 @@ from .shrinkage import shrinkage
 from .stages import AVERAGED, CONTACT, STATE, STEPS, STRENGTH, TETS
 
 NANOSECONDS = {"tet": 80.0, "nodal": 45.0, "split": 90.0, "eos": 15.0}
-"""Core time per tet and step: for every tet, and for each feature; laws of strength have separate times (cases/laws).
-Measured with 10,000 to 750,000 tets."""
+"""CPU time per tet and time step, ns: the first value for every tet, the others in addition for tets with this feature.
+The laws of strength have their own values (cases/laws). The values were measured with 10,000 to 750,000 tets."""
 FACE_NANOSECONDS = {"contact": 50.0, "erosion": 1400.0}
-"""Core time per surface face and step; the second value is for parts that erode, stay in contact, and are searched
-often."""
+"""CPU time per surface face and time step, ns. The second value is for parts with erosion, which stay in contact and
+whose candidate pairs are often searched again."""
 STEP_OVERHEAD = 0.3e-3
-"""Core time of a rank per step, s, in addition to the core time of its tets."""
+"""CPU time of a rank per time step, s, in addition to the time for its tets."""
 START = 2.0
-"""Core time of a rank before its first step, s, with a warm kernel cache."""
+"""CPU time of a rank before its first time step, s, if the kernels are already compiled."""
 
 BROKEN_NANOSECONDS = 15_000.0
-"""Core time per tet and step of a body that has turned to dust, whose fragments touch each other. Measured: 3 to 14 us
-in the ten hard cases that break without a prescribed motion (docs/verification/accuracy.md: CPU s less the estimate
-without dust, divided by steps and by tets that can break); 10 to 20 us in a glass plate under an eroding cylinder, on
-aluminium, with friction. A broken facet costs 7 us, and completely fragmented material has two broken facets for each
-tet."""
+"""CPU time per tet and time step, ns, of a body that has broken to single tets (dust) in contact with each other.
+Measured: 3 to 14 us in the ten hard cases that break without a prescribed motion (docs/verification/accuracy.md: CPU
+time minus the estimate without dust, divided by the number of steps and of tets that can break); 10 to 20 us in a glass
+plate on aluminium under an eroding cylinder, with friction. A broken facet costs 7 us per step, and completely broken
+material has two broken facets for each tet."""
 PRESSED_NANOSECONDS = 26_000.0
-"""Core time per tet and step of dust that is enclosed and pressed; every tet is then in contact on all sides, and
-contact needs many sweeps. Measured: a plug of glass under a ram (tests/bench/press.py) 17,000 to 20,000 on one rank; a
-block of 3,600 tets between walls, compressed by a ram to four fifths and two thirds of its height, 18,000 and 26,000;
-less where the dust can move aside."""
+"""CPU time per tet and time step, ns, of dust that is enclosed and compressed: every tet is in contact on all sides,
+and the contact solver needs many sweeps. Measured on one rank: 17,000 to 20,000 ns in a plug of glass under a ram
+(tests/bench/press.py); 18,000 and 26,000 ns in a block of 3,600 tets between walls, compressed by a ram to four fifths
+and to two thirds of its height; less where the dust can move aside."""
 BREAKING_OVERHEAD = 2e-3
-"""Core time of a rank per step in which any facet breaks, s: 1 to 4 ms in twelve scenes of 150 to 24,000 tets."""
+"""CPU time of a rank, s, in each time step in which a facet breaks: 1 to 4 ms in twelve scenes of 150 to 24,000 tets.
+"""
 
 RIGID_STEPS = 1000.0
-"""Number of steps of a run with rigid parts only; more steps if the rotation of the parts needs more
-(worker/rigid/stage.py)."""
+"""Number of time steps of a run with only rigid parts; fast rotation of a part increases it (worker/rigid/stage.py)."""
 
 RANK_BYTES = 280_000_000
-"""Memory of a rank without a mesh: interpreter, libraries and the kernels of a single body. Rank 0, which writes all
-files, uses 260 MB, and 300 MB if pyarrow also writes a history as Parquet; each other rank uses 240 MB."""
+"""Memory of a rank without a mesh, bytes: interpreter, libraries, and the kernels for a single body. Measured: 260 MB
+for rank 0, which writes all files, and 300 MB if pyarrow also writes the history as Parquet; 240 MB for each other
+rank."""
 STAGE_BYTES = {"contact": 20_000_000, "fracture": 30_000_000}
-"""Additional memory of a rank for kernels and tables of a stage. The case bar_on_bar used 276 MB in all; the tile of
-docs/tutorial/first_case.md used 301 MB before fracture."""
+"""Memory of a rank for the kernels and tables of a stage, bytes, in addition to RANK_BYTES. Measured: 276 MB in all for
+the case bar_on_bar; 301 MB in all for the tile of docs/tutorial/first_case.md before it fractures."""
 TET_BYTES = {"tet": 330, "nodal": 110, "split": 140, "strength": 50, "facets": 130}
-"""Memory per tet, including the tet's share of the nodes, at the peak during the setup of the model
+"""Memory per tet and its share of the nodes, bytes, at its maximum during the setup of the model
 (docs/performance/bench.md)."""
 DUST_BYTES = 38_000
-"""Additional memory per tet of a body that has turned to dust: copies of nodes, surface, candidate pairs and their
-tables. Measured as the peak of a rank with half of the facets broken, less its memory before fracture: 20 kB in the
-tile of docs/tutorial/first_case.md with 3,900 tets, 35 and 40 kB with the 57 MB that rank 0 needs at the end to write
-the history as Parquet; 20 kB in glass_ball_cohesive on two ranks. Glass bars with a quarter of the facets broken needed
-7 and 5 kB per tet: glass_steel_bar with 9,000 and 39,000 tets."""
+"""Memory per tet of a body that has broken to single tets, bytes, in addition to TET_BYTES: copies of nodes, surface,
+candidate pairs and their tables. Measured as the largest memory of a rank with half of its facets broken, minus its
+memory before fracture: 20 kB per tet in the tile of docs/tutorial/first_case.md with 3,900 tets; 35 and 40 kB if the 57
+MB are included with which rank 0 writes the history as Parquet; 20 kB in the case glass_ball_cohesive on two ranks. The
+glass bars of the case glass_steel_bar with 9,000 and 39,000 tets and a quarter of their facets broken needed 7 and 5 kB
+per tet."""
 FILE_BYTES = {".msh": 42, ".inp": 48}
-"""Bytes per tet of a mesh file in text, including the tet's share of the node lines."""
+"""Bytes per tet of a mesh file in text form, including the lines of the nodes."""
 
 
 @dataclass(frozen=True)
 class PartEstimate:
-    """Estimate of a part; None if its mesh file is not known."""
+    """Estimate of one part. A number is None if the mesh file of the part was not read."""
 
     name: str
     elements: int | None
     nodes: int | None
     dt: float | None
-    """Stable time step of the smallest tet of the part at the start, s; infinite for a rigid part."""
+    """Stable time step of the smallest tet of the part at the start, s. It is infinite for a rigid part."""
     bulk: Bulk | None = None
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Estimate of a case; None if the mesh file of a part is not known."""
+    """Estimate of a case. A number is None if the mesh file of a part was not read."""
 
     elements: int | None
     nodes: int | None
@@ -99,8 +101,8 @@ class Estimate:
     clock: ClockTime | None
     """Wall time of the case on its ranks and threads."""
     costs: dict[str, float]
-    """Core time of each stage of the case (cases/estimates/stages.py), s; empty if unknown. Fracture costs more, by an
-    amount that cannot be estimated."""
+    """CPU time of each stage of the case (cases/estimates/stages.py), s; empty if unknown. The cost of fracture is not
+    included: its amount depends on the run."""
     breaking: float
     """Additional CPU time, s, if the parts that can fracture break as far as they can; 0 without fracture."""
     dust_bytes: int
@@ -109,8 +111,8 @@ class Estimate:
 
 
 def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) -> Estimate:  # noqa: B008
-    """Returns the estimate of ``case``. Relative paths of mesh files start in ``folder`` (without ``folder`` no file is
-    read); ``survey``: the survey of the mesh files. Raises CaseError if a material is unknown.
+    """Returns the estimate of ``case``. ``folder``: folder to which the paths of mesh files are relative; without it no
+    file is read. ``survey``: result of the survey of the mesh files. Raises CaseError if a material is unknown.
     """
     known = [survey.of(index) for index in range(len(case.parts))]
     sizes = [_size(part, folder, found) for part, found in zip(case.parts, known, strict=True)]
@@ -140,12 +142,12 @@ def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) 
 
 
 def _at_most(case: Case, dt: float | None) -> float | None:
-    """Time step of a case with rigid parts only, s: such a run has at least a fixed number of steps."""
+    """Time step, s, limited so that a case with only rigid parts has at least a fixed number of steps."""
     return case.run.end_time / RIGID_STEPS if dt == math.inf else dt
 
 
 def _size(part: Part, folder: Path | None, found: Surveyed | None) -> MeshSize | int | None:
-    """Returns the known data of the mesh of a part: all sizes, or only the number of tets, or None."""
+    """Returns what is known of the mesh of the part: its size (MeshSize), only its number of tets, or None."""
     if found is not None:
         return MeshSize(found.elements, found.nodes, found.step_length)
     if not isinstance(part.mesh, Measured):
@@ -199,7 +201,9 @@ def _tet_bytes(case: Case, part: Part) -> int:
 
 
 def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None, faces: int) -> dict[str, float]:
-    """Returns core seconds by stage, for mesh files with ``faces`` faces; empty if the number of tets is unknown."""
+    """Returns the CPU time of each stage, s; the result is empty if the number of tets is unknown. ``faces``: number of
+    surface faces of the parts with mesh files.
+    """
     if steps is None or any(size.elements is None for size in parts):
         return {}
     found = {STEPS: steps * case.run.ranks * STEP_OVERHEAD + case.run.ranks * START}
@@ -211,9 +215,9 @@ def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None, faces
 
 
 def _breaking(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> float:
-    """Returns the largest core time of fracture, and of contact between fragments, s. A part that moves freely is
-    assumed to break as far as its kinetic energy allows; a part with a prescribed motion is assumed to become dust and
-    to be pressed.
+    """Returns the largest CPU time, s, of fracture and of contact between fragments. A part that moves freely is
+    assumed to break as far as its kinetic energy allows. A part with a prescribed motion is assumed to break to single
+    tets that are compressed.
     """
     pressed = case.in_contact and driven_together(case)
     dust = 0.0
@@ -226,12 +230,13 @@ def _breaking(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) ->
 
 
 def broken_share(case: Case, part: Part, speed: float) -> float:
-    """Returns the largest share of the facets of a part that can break in an impact at ``speed``, m/s.
+    """Returns the largest fraction of the facets of a part that can break in an impact at ``speed``, m/s.
 
-    The size of fragments is such that the kinetic energy of their stretching equals the energy of their crack surface:
-    s^3 = 24 G / (density rate^2), Grady 1982 (J. Appl. Phys. 53, 322); facets are one element apart. The rate is the
-    largest of three: the rate of the part's stretch or spin; the speed divided by the length of the part; the rate that
-    strains the part to its strength while a wave crosses it. The share is 1 for mesh files.
+    The size s of the fragments follows from the balance of the kinetic energy of their stretching and the energy of
+    their crack surface: s^3 = 24 G / (density rate^2), Grady 1982 (J. Appl. Phys. 53, 322). Facets are one element
+    apart. The rate is the largest of three: the rate of the stretch or spin of the part; ``speed`` divided by the
+    length of the part; the rate that strains the part to its strength while a wave crosses it. For a mesh file the
+    returned fraction is 1.
     """
     made, body = material(case, part.material), bounds(part.mesh)
     if made.brittle is None or body is None or isinstance(part.mesh, Measured):
@@ -244,14 +249,14 @@ def broken_share(case: Case, part: Part, speed: float) -> float:
 
 
 def _tets_that_break(case: Case, parts: tuple[PartEstimate, ...]) -> int:
-    """Returns the number of tets of the parts that fracture, as far as mesh files are known."""
+    """Returns the number of tets of the parts that can fracture, without parts whose mesh file was not read."""
     pairs = zip(parts, case.parts, strict=True)
     return sum(size.elements or 0 for size, part in pairs if part.fracture is not None)
 
 
 def _contact(case: Case, faces: int) -> float:
-    """Returns the core time of contact per step, ns; ``faces``: number of faces of the parts from mesh files, as far as
-    known.
+    """Returns the CPU time of contact per time step, ns. ``faces``: number of surface faces of the parts with mesh
+    files, without files that were not read.
     """
     if not case.in_contact:
         return 0.0
@@ -260,7 +265,7 @@ def _contact(case: Case, faces: int) -> float:
 
 
 def _nanoseconds(case: Case, part: Part) -> dict[str, float]:
-    """Returns the core time per tet and step by stage, ns."""
+    """Returns the CPU time of each stage per tet and time step, ns."""
     if part.rigid is not None:
         return {}
     made = material(case, part.material)

@@ -1,4 +1,4 @@
-"""Impact speeds of the parts, and the numerical parameters of contact that depend on them."""
+"""Impact speeds of the parts of a case, and the parameters of the contact solver that depend on them."""
 
 import itertools
 import math
@@ -15,28 +15,29 @@ from ..shapes.geometry import Vector
 from ..shapes.placed import Placed, driven, velocity
 
 FEW, MANY, FULL, MOST = 5, 10, 40, 80
-"""Numbers of contact sweeps per step: minimum, minimum at high impact speed, minimum for driven rubble and with
-restitution, and maximum. The reasons are in docs/theory/contact.md, "Contact", "Driven rubble", "Sweeps by need" and
-"Restitution"."""
+"""Numbers of contact sweeps per time step: the smallest number; the smallest number at high impact speed; the smallest
+number for driven rubble and with restitution; the largest number. The sections "Contact", "Driven rubble", "Sweeps by
+need" and "Restitution" of docs/theory/contact.md give the reasons."""
 FAST = 0.2
-"""Impact speed divided by the wave speed of the target, above which the minimum number of sweeps is MANY. The value is
-below half of the speed at which few sweeps failed for columns of metal (docs/theory/contact.md, "Plates under 100
+"""Impact speed divided by the wave speed of the target, above which a step has at least MANY sweeps. The value is below
+half of the speed at which columns of metal became wrong with few sweeps (docs/theory/contact.md, "Plates under 100
 GPa")."""
 PRESSING = 0.1
-"""Impact speed divided by the wave speed, above which flat surfaces buckle. The value is half of the speed at which
-irregular copper plates lost their pressure (docs/theory/contact.md, "Ridges under pressure")."""
+"""Impact speed divided by the wave speed, above which flat contact surfaces buckle. The value is half of the speed at
+which the contact pressure between irregular copper plates was lost (docs/theory/contact.md, "Ridges under pressure").
+"""
 
 
 def wave_speed(made: Material) -> float:
-    """Returns the speed of plane waves at rest, m/s: sqrt((K + 4 G / 3) / density), K from the equation of state if the
-    material has one.
+    """Returns the speed of plane waves in the undeformed material, m/s: sqrt((K + 4 G / 3) / density), with the bulk
+    modulus K of the equation of state if there is one.
     """
     return math.sqrt((made.bulk + 4.0 / 3.0 * made.elastic.shear) / made.density)
 
 
 def impact_speeds(case: Case, walls: bool = True) -> list[float]:
-    """Returns the largest speed, m/s, at which each part can hit another part, or also a wall if ``walls`` is true. The
-    speed is computed from the bounds of the velocities, and may be up to sqrt(3) times too large if a body rotates.
+    """Returns, for each part, the largest speed, m/s, at which it can hit another part; if ``walls`` is true, also a
+    wall. The speed follows from bounds of the velocities. If a body rotates, it may be up to sqrt(3) times too large.
     """
     bounds = [velocities(case, part) for part in case.parts]
     there = Counter(bounds)
@@ -54,8 +55,8 @@ def apart(low: Vector, high: Vector, low2: Vector, high2: Vector) -> float:
 
 
 def velocities(case: Case, part: Part) -> tuple[Vector, Vector]:
-    """Returns bounds of the velocities, m/s, of the nodes of a part at the start or as prescribed; spin and stretch of
-    a mesh file are not included.
+    """Returns bounds of the velocities, m/s, of the nodes of the part, initial or prescribed. The spin and stretch of a
+    part with a mesh file are not included.
     """
     if isinstance(part.mesh, Measured):
         found = [part.velocity]
@@ -98,11 +99,11 @@ def _fast(case: Case, share: float) -> bool:
 
 
 def pressed(case: Case) -> list[bool]:
-    """Returns the parts that are pressed together beyond their strength, so that flat surfaces buckle.
+    """Returns, for each part, whether an impact presses it beyond its strength, so that flat contact surfaces buckle.
 
-    All parts are returned if two of them collide at more than PRESSING times the wave speed of one of them. Otherwise
-    the function returns the parts that yield without fracture, if an impact on the same material exceeds their flow
-    stress: density c v / 2.
+    If two parts collide at more than PRESSING times the wave speed of one of them, the result is true for all parts.
+    Otherwise it is true for each part that yields, cannot fracture, and is hit so fast that the stress density c v / 2
+    of an impact on the same material exceeds its flow stress.
     """
     if _fast(case, PRESSING):
         return [True] * len(case.parts)
@@ -113,13 +114,15 @@ def pressed(case: Case) -> list[bool]:
 
 
 def flows(made: Material, speed: float) -> bool:
-    """Whether an impact of a material on the same material at ``speed``, m/s, exceeds its flow stress."""
+    """Whether the stress of an impact on the same material at ``speed``, m/s, exceeds the flow stress of the
+    material.
+    """
     return made.strength is not None and 0.5 * made.density * wave_speed(made) * speed > made.strength.flow_stress()
 
 
 def driven_together(case: Case) -> bool:
-    """Whether contact is possible while a prescribed motion or a traction acts on a part. A prescribed motion presses
-    for its whole duration; an impact presses only until the bodies have stopped.
+    """Whether the case has contact and a prescribed motion or a traction on a part. A prescribed motion presses parts
+    together during the whole run; an impact does so only until the bodies have stopped.
     """
     if case.boundaries_of(Traction):
         return len(case.parts) > 1 or bool(case.boundaries_of(Wall))
@@ -128,15 +131,17 @@ def driven_together(case: Case) -> bool:
 
 
 class Sweeps(NamedTuple):
-    """Bounds of the number of sweeps over the active contacts of a step; the first step has the minimum."""
+    """Smallest and largest number of sweeps over the active contacts of a time step; the first step has the smallest
+    number.
+    """
 
     least: int
     most: int
 
 
 def sweeps(case: Case) -> Sweeps:
-    """Returns ``contact.sweeps``; if the key is absent, the bounds of the adaptive number of sweeps, from the
-    properties of the scene.
+    """Returns ``contact.sweeps``. If the case has no such key, returns the bounds between which the number of sweeps
+    adapts, from the properties of the scene.
     """
     assert case.contact is not None
     if case.contact.sweeps is not None:

@@ -1,4 +1,6 @@
-"""Estimates of the mesh of a primitive: number of tets, nodes and faces, and the step length of its worst tet."""
+"""Estimates of the mesh of a primitive: number of tets, nodes and faces, and the step length of its worst tet (the one
+with the smallest stable time step).
+"""
 
 import math
 from dataclasses import dataclass
@@ -23,30 +25,33 @@ from ..shapes.profile import Revolved, tips
 
 TETS_PER_VOLUME, TETS_PER_SURFACE = 5.55, 1.42
 NODES_PER_VOLUME, NODES_PER_SURFACE = 0.87, 1.23
-"""Coefficients a and b: gmsh makes a V / h^3 + b S / h^2 tets and nodes for a body with volume V, surface S and element
-size h. The coefficients were fitted to seven bodies."""
+"""Coefficients a and b of the number of nodes; those of the number of tets are above. For a body with volume V, surface
+S and element size h, gmsh makes a V / h^3 + b S / h^2 tets or nodes. The coefficients were fitted to seven bodies."""
 
 FACES_PER_SURFACE = 1.8
-"""Number of faces of a surface S divided by S / h^2, with the element size h; a structured mesh has the value 2."""
+"""Number of surface faces divided by S / h^2, for the surface S and the element size h in meshes of gmsh. The
+structured generator has the value 2."""
 
 REGULAR = 6**-0.5
-"""Step length 1 / sqrt(sum |grad N|^2) divided by the edge h: of the regular tet, and of the tets of a cut cube."""
+"""Step length 1 / sqrt(sum |grad N|^2) divided by the edge h, for a regular tet; the tets of a cut cube have the same
+value."""
 WORST_UNSTRUCTURED = 0.68
-"""Step length of the worst tet of gmsh divided by that of a regular tet: 0.64 to 0.74 for the seven bodies of the
-fit."""
+"""Step length of the worst tet in a mesh of gmsh, divided by the step length of a regular tet. Measured: 0.64 to 0.74
+for the seven bodies of the fit."""
 SHARP, BLUNT = 1.3, 0.9
-"""Largest step length at the tip of a cone or an ogive, divided by h. For a sharp tip: the first value times the
-tangent of half the angle of the tip; for a flat or round tip: the second value times the radius of the tip over h.
-Measured for full bodies and sectors: 0.16 to 0.25 and 0.40 to 0.68 for cones with half an angle of 9 and 27 degrees;
-0.20 to 0.24 and 0.20 to 0.64 for tips with a radius of h/4 and h/2."""
+"""Largest step length of a tet at the tip of a cone or an ogive, divided by h. Sharp tip: the first value times the
+tangent of half the angle of the tip. Flat or round tip: the second value times the radius of the tip divided by h.
+Measured for full bodies and sectors: 0.16 to 0.25 and 0.40 to 0.68 for cones whose half angle is 9 and 27 degrees; 0.20
+to 0.24 and 0.20 to 0.64 for tips whose radius is h/4 and h/2."""
 WORST_CYLINDER, WORST_TUBE = 0.81, 0.78
-"""Step length of structured cylinders whose cells are cut into 6 tets, and of structured tubes."""
+"""Step length of the worst tet, divided by that of a cut cube: in structured cylinders whose cells are cut into 6 tets,
+and in structured tubes."""
 WORST_FIVE = 0.54
-"""Step length of structured cylinders whose cells are cut into 5 tets, times the number of cells along the radius:
-these tets flatten on the diagonal."""
+"""The same ratio for structured cylinders whose cells are cut into 5 tets, times the number of cells along the radius:
+the tets on the diagonal become flat."""
 WORST_SHARD = 1.7
-"""Reduction of the step length of the worst separate tet divided by the displacement of its nodes: 1.5 to 1.9 among
-1,000 and 10,000 tets."""
+"""Relative reduction of the step length of the worst separate tet, divided by ``perturbation``. Measured: 1.5 to 1.9
+among 1,000 and 10,000 tets."""
 
 _LATTICE = 20
 """Number of sampling points per direction for the mean of a graded element size: 8,000 points in all (chosen value)."""
@@ -74,7 +79,7 @@ def mesh_size(mesh: Generated) -> MeshSize:
 
 
 def _worst(mesh: Generated) -> float:
-    """Returns the step length of the worst tet of gmsh divided by that of a regular tet."""
+    """Returns the step length of the worst tet in a mesh of gmsh, divided by the step length of a regular tet."""
     if not isinstance(mesh, Revolved):
         return WORST_UNSTRUCTURED
     at_tips = [SHARP * slope if radius == 0.0 else BLUNT * radius / mesh.element_size for radius, slope in tips(mesh)]
@@ -82,14 +87,14 @@ def _worst(mesh: Generated) -> float:
 
 
 def surface_faces(mesh: Generated) -> int:
-    """Returns the estimated number of surface faces of a primitive, including the cuts of its sector."""
+    """Returns the estimated number of surface faces of a primitive, including the faces on the cuts of its sector."""
     return round(FACES_PER_SURFACE * _covering(mesh))
 
 
 def _covering(mesh: Generated) -> float:
-    """Returns the integral of 1 / h^2 over the surface, with the cuts of the sector, for the element size h. If the
-    element size depends on the depth below the surface, the surface has the ``element_size``; otherwise the mean over
-    the volume is used.
+    """Returns the integral of 1 / h^2 over the surface and the cuts of the sector, with the element size h. In a mesh
+    graded by the depth below the surface, h is ``element_size`` on the whole surface. In other meshes the mean of 1 /
+    h^2 over the volume is used.
     """
     if mesh.grading is None or not mesh.grading.surface:
         return surface(mesh) * _mean_powers(mesh)[1]
@@ -137,15 +142,17 @@ def _structured(mesh: Box | Plate | Cylinder | Tube | TwoTets | Shards) -> MeshS
 
 @dataclass(frozen=True)
 class Row:
-    """Planes of nodes of the structured generator across one direction; ``start`` and ``spacing`` in m."""
+    """The planes of nodes of the structured generator that are normal to one direction: coordinate ``start`` of the
+    first plane and distance ``spacing`` between planes, m.
+    """
 
     start: float
     spacing: float
     cells: int
 
     def place(self, x: float) -> float:
-        """Number of planes up to the coordinate ``x``, m; a number that is whole within rounding errors counts as
-        whole.
+        """Number of spacings from the first plane to the coordinate ``x``, m; a number that is whole within rounding
+        errors counts as whole.
         """
         place = (x - self.start) / self.spacing
         return round(place) if abs(place - round(place)) < 1e-6 else place
@@ -159,7 +166,7 @@ def grid(mesh: Box | Plate) -> list[Row]:
 
 
 def slit_lines(mesh: Box | Plate) -> tuple[int, int]:
-    """Numbers of lines of doubled nodes of a slit, in the two directions across the slit's axis; 0, 0 without a
+    """Numbers of lines of nodes that a slit doubles, in the two directions across the axis of the slit; 0, 0 without a
     slit.
     """
     if mesh.slit is None:
@@ -173,8 +180,8 @@ def slit_lines(mesh: Box | Plate) -> tuple[int, int]:
 
 
 def _doubled(row: Row, low: float, high: float) -> int:
-    """Number of planes between two coordinates; a border on the surface of the body counts, a border inside of the body
-    does not.
+    """Number of planes between two coordinates. A border on the surface of the body counts; a border inside the body
+    does not count.
     """
     first = 0 if low <= 0 else math.floor(low) + 1
     last = row.cells if high >= row.cells else math.ceil(high) - 1
@@ -210,7 +217,9 @@ def _structured_tube(mesh: Tube) -> MeshSize:
 
 
 def _cell_step(cell: list[float]) -> float:
-    """Step length of a tet of a cut box-shaped cell: 1 / sqrt(2 sum 1 / a^2), for every way of cutting the cell."""
+    """Step length of a tet of a box-shaped cell with the edges a, m: 1 / sqrt(2 sum 1 / a^2), the same for both ways of
+    cutting the cell.
+    """
     return 1.0 / math.sqrt(2.0 * sum(1.0 / length**2 for length in cell))
 
 

@@ -1,4 +1,6 @@
-"""Reduction of the mean time step below the first time step: impact and pressure flatten tets and make waves faster."""
+"""Ratio of the first time step of a run to its mean time step: impact and pressure flatten tets and make waves faster,
+which reduces the time step.
+"""
 
 import math
 from collections.abc import Sequence
@@ -14,24 +16,24 @@ from ..shapes.geometry import AXES, bounds
 from .impact import wave_speed
 
 DEEPEST, DEEPEST_ERODING = 12.0, 4.0
-"""Largest reduction of the time step of a crushed body; the limit holds because the flattest tets of a part that erodes
-are deleted."""
+"""Largest ratio for a body that is crushed, and for a part with erosion. The second value is smaller because erosion
+deletes the flattest tets."""
 FOOT, SLENDER = 0.9, 4.5
 """Factor of k, and largest ratio of length to width, in the function ``shrinkage``."""
 CROSSINGS = 2.0
-"""Duration of a shock in a part, divided by the ratio of its extent and the impact speed. Measured: the time step of
-two copper balls of 1 mm that collide at 10 km/s (cases/hard/head_on_10km.toml) is short for 0.2 us."""
+"""Duration of a shock in a part, divided by the extent of the part over the impact speed. Measured: in a collision of
+two copper balls of 1 mm at 10 km/s (cases/hard/head_on_10km.toml) the time step is short during 0.2 us."""
 
 
 def shrinkage(case: Case, part: Part, speed: float) -> float:
-    """Returns the initial time step divided by the mean time step of a part that is hit at a ``speed``, m/s: impact
+    """Returns the first time step divided by the mean time step of a part that is hit at ``speed``, m/s: impact
     flattens the tets, and compression makes waves faster.
 
-    A metal that can flow and stops from the speed v takes the mean strain density v^2 / (2 yield stress). Its foot,
-    about as long as wide, takes the strain of the whole length: the mean time step falls as exp(k strain) with k = 0.9
-    length / width, at most 4 (``slenderness``). Measured: square bars that are 1, 2 and 4 times as long as wide have k
-    up to 0.9, 1.8 and 2.8, less with strong hardening (``python -m tests.bench.flattening``); Taylor bars of copper and
-    steel have k = 4. A part that is enclosed is compressed by a shock.
+    A metal that flows and is stopped from the speed v reaches the mean strain density v^2 / (2 yield stress). The
+    struck end of the part, about as long as it is wide, takes the strain of the whole length. The mean time step
+    decreases as exp(-k strain) with k = 0.9 length / width, at most 4 (``slenderness``). Measured: square bars that are
+    1, 2 and 4 times as long as wide have k up to 0.9, 1.8 and 2.8, less with strong hardening (``python -m
+    tests.bench.flattening``); Taylor bars of copper and steel have k = 4. A shock compresses a part that is enclosed.
     """
     made = material(case, part.material)
     deepest = DEEPEST if part.erosion is None else DEEPEST_ERODING
@@ -48,10 +50,10 @@ def shrinkage(case: Case, part: Part, speed: float) -> float:
 
 
 def _shocked(case: Case, part: Part, made: Material, speed: float, flattened: float) -> float:
-    """Returns the reduction of the time step of a part that an impact shocks or flattens. Material behind a shock moves
-    at u = speed / 2, and waves behind the shock are about 2 S u faster than c0, while the part crosses its own extent.
-    While the shock crosses the part, a tet that erodes flattens up to its limit strain; later the flat tets are
-    deleted.
+    """Returns the reduction of the time step of a part that an impact shocks or flattens. Material behind the shock
+    front moves at u = speed / 2. Waves there are about 2 S u faster than c0 (S: slope of the Hugoniot) until the shock
+    has crossed the part. During this time a tet of a part with erosion flattens up to its limit strain; later the flat
+    tets are deleted.
     """
     body = None if isinstance(part.mesh, Measured) else bounds(part.mesh)
     if part.erosion is None:
@@ -72,11 +74,11 @@ def _on_part(case: Case, part: Part) -> list[Traction]:
 
 
 def _imploded(case: Case, part: Part, made: Material, load: Traction) -> float:
-    """Returns the reduction of the time step of a tube under an external ``load`` above its collapse pressure, Y
-    ln(outer / inner radius).
+    """Returns the reduction of the time step of a tube under an external ``load``, Pa, above its collapse pressure Y
+    ln(outer / inner radius), with the yield stress Y.
 
-    The wall moves inwards freely at constant area; material at the bore takes the hoop strain ln(first / present
-    radius). A bore that closes flattens the tets of the tube without limit.
+    The wall moves inwards freely at constant cross-section. Material at the bore reaches the hoop strain ln(first
+    radius / present radius). If the bore closes, the tets of the tube flatten without limit.
     """
     tube, flow = part.mesh, made.strength.flow_stress() if made.strength is not None else math.inf
     if not isinstance(tube, Tube) or load.pressure is None or not _outside(tube, load.cylinder):
@@ -90,19 +92,21 @@ def _imploded(case: Case, part: Part, made: Material, load: Traction) -> float:
 
 
 def _outside(tube: Tube, region: Around | None) -> bool:
-    """Whether a region contains the outside of a tube, and not the bore of the tube."""
+    """Whether the region contains the outer surface of the tube but not its bore."""
     return region is not None and tube.inner_radius < region.inner_radius <= tube.radius <= region.radius
 
 
 def _moved(course: Course, until: float) -> float:
-    """Displacement, s^2, per acceleration of 1 m/s^2 that acts with the factor of a course."""
+    """Displacement after the time ``until``, m, for an acceleration of 1 m/s^2 times the factor of the course."""
     times = [until * n / 100 for n in range(101)]
     factors = [_factor(course, time) for time in times]
     return sum((until - time) * factor for time, factor in zip(times, factors, strict=True)) * until / 100
 
 
 def _factor(course: Course, time: float) -> float:
-    """Factor of a force at a time: linear between the pairs, constant before the first pair and after the last pair."""
+    """Factor of the course at a time: linear between the pairs of the course, constant before the first pair and after
+    the last pair.
+    """
     if not course or time <= course[0][0]:
         return course[0][1] if course else 1.0
     for (start, low), (end, high) in pairwise(course):
@@ -112,9 +116,9 @@ def _factor(course: Course, time: float) -> float:
 
 
 def slenderness(case: Case) -> float:
-    """Returns the largest ratio of length to width of the parts, between 1 and SLENDER; SLENDER with a mesh file. The
-    length is the longest extent of a part, the width is the mean of the other two extents; a slender part also strains
-    the part that it hits.
+    """Returns the largest ratio of length to width of all parts, limited to 1 to SLENDER; with a mesh file the result
+    is SLENDER. The length is the largest extent of a part, and the width is the mean of its other two extents. The
+    largest ratio counts for all parts because a slender part also strains the part that it hits.
     """
     most = 1.0
     for part in case.parts:

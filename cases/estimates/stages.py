@@ -1,5 +1,5 @@
-"""The stages of a case: the operations of a time step that its scene needs. Operations that the scene does not need are
-not computed.
+"""The stages of a case: operations of a time step that only some scenes need. Operations that the scene does not need
+are not computed.
 """
 
 from ..model.boundaries import Wall
@@ -10,11 +10,14 @@ from ..reading.library import material
 TETS, STEPS, AVERAGED, STRENGTH, STATE, CONTACT = (
     "tets", "start and steps", "averaged pressure", "strength", "equation of state", "contact",
 )  # fmt: skip
-"""Stages whose cost is estimated before a run (cases/estimates/estimate.py); every case has the first two stages."""
+"""Names of the stages whose cost is estimated before a run (cases/estimates/estimate.py). Every case has the first two
+stages."""
 
 
 def stages(case: Case) -> dict[str, bool]:
-    """Returns which optional stages a case has, by the name of the stage. Raises CaseError if a material is unknown."""
+    """Returns whether the case has each optional stage, by the name of the stage. Raises CaseError if a material is
+    unknown.
+    """
     made = [material(case, part.material) for part in case.parts if part.rigid is None]
     contact = case.contact if case.in_contact else None
     rubbing = [wall.friction for _, wall in case.boundaries_of(Wall)]

@@ -12,8 +12,8 @@ from .law import Law, Likely, Wrong
 
 
 class JohnsonCookDamage(Model):
-    """Johnson-Cook damage: sum of plastic strain increments over the fracture strain ``(D1 + D2 e^(D3 t)) (1 + D4 ln
-    max(rate/reference_rate, 1)) (1 + D5 T*)``, t the mean stress over the flow stress.
+    """Johnson-Cook damage: the sum of the plastic strain increments divided by the fracture strain ``(D1 + D2 e^(D3 t))
+    (1 + D4 ln max(rate/reference_rate, 1)) (1 + D5 T*)``, where t is the mean stress divided by the flow stress.
 
     A tet is deleted when its damage reaches ``erosion.damage``. The flow stress is multiplied by ``1 - softening *
     damage``. Sources: Johnson and Cook 1985 for the damage; Borvik, Hopperstad, Berstad and Langseth 2001 for the
@@ -23,7 +23,7 @@ class JohnsonCookDamage(Model):
     D1: Ratio
     """Constant D1: fracture strain at high tension."""
     D2: Ratio
-    """Constant D2: increase of the fracture strain at zero tension."""
+    """Constant D2: increase of the fracture strain from high tension to zero mean stress."""
     D3: Ratio
     """Exponent of the mean stress; negative if tension reduces the fracture strain."""
     D4: Ratio = 0.0
@@ -36,7 +36,7 @@ class JohnsonCookDamage(Model):
 
     @property
     def in_tension(self) -> float:
-        """Fracture strain of a tensile test, t = 1/3, at the reference rate and the reference temperature."""
+        """Fracture strain in a tensile test (t = 1/3) at the reference rate and the reference temperature."""
         return self.D1 + self.D2 * math.exp(min(self.D3 / 3.0, 300.0))
 
 

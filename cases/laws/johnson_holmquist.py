@@ -11,13 +11,15 @@ from .law import Law, Wrong
 
 
 class JohnsonHolmquist(Law):
-    """Johnson-Holmquist 2 (JH-2), for ceramics and glass under high pressure: the pressure-dependent strength falls
-    with damage D from intact, ``A (p* + T*)^N``, to fractured, ``B p*^M``, with bulking.
+    """Johnson-Holmquist 2 (JH-2), a law for ceramics and glass under high pressure. The strength depends on the
+    pressure. It decreases with the damage D from that of intact material, ``A (p* + T*)^N``, to that of fractured
+    material, ``B p*^M``; damaged material increases its pressure (bulking).
 
-    ``p*`` and ``T*`` are pressure and ``tension`` divided by ``pressure_hel``; strengths are divided by the strength at
-    the Hugoniot elastic limit, ``3/2 (hel - pressure_hel)``, and are multiplied by ``1 + C ln max(rate/reference_rate,
-    1)``. The fractured strength is never above the intact strength. The damage D is the sum of plastic strain
-    increments over ``D1 (p* + T*)^D2``. The largest tensile pressure is ``tension * (1 - D)``.
+    ``p*`` is the pressure divided by ``pressure_hel``, and ``T*`` is ``tension`` divided by ``pressure_hel``. Both
+    strengths are divided by the strength at the Hugoniot elastic limit, ``3/2 (hel - pressure_hel)``, and are
+    multiplied by ``1 + C ln max(rate/reference_rate, 1)``. The fractured strength is never above the intact strength.
+    The damage D is the sum of the plastic strain increments divided by ``D1 (p* + T*)^D2``. The largest tensile
+    pressure is ``tension * (1 - D)``.
 
     The pressure is ``K m + K2 m^2 + K3 m^3`` with ``m = V0/V - 1`` and K from ``elastic``; in tension the pressure is K
     m. The fraction ``beta`` of the elastic energy that damage releases becomes pressure. Source: Johnson and Holmquist
@@ -53,9 +55,9 @@ class JohnsonHolmquist(Law):
     D2: Annotated[Ratio, Field(ge=0)]
     """Exponent of the pressure in the plastic strain to fracture."""
     K2: Stress = 0.0
-    """Second coefficient of the pressure, K2."""
+    """Coefficient K2 of the square of m in the pressure."""
     K3: Stress = 0.0
-    """Third coefficient of the pressure, K3."""
+    """Coefficient K3 of the cube of m in the pressure."""
     beta: Annotated[Ratio, Field(ge=0, le=1)] = 1.0
     """Bulking: fraction of the deviatoric elastic energy released by damage that becomes pressure."""
 

@@ -1,8 +1,9 @@
-"""The base class of the laws of strength: cost, estimates and checks that every law provides besides its constants.
+"""The base class of the laws of strength: the checks, the estimates and the computing cost that every law provides in
+addition to its constants.
 
-A law has two files of the same name: one in cases/laws with its constants in SI, its checks and its estimates, and one
-in worker/materials with its kernel. The lists of laws are ``Strength`` in cases/model/materials.py and ``LAWS`` in
-worker/materials/models.py.
+Each law has two files of the same name: the file in cases/laws has its constants in SI units, its checks and its
+estimates; the file in worker/materials has its kernel. The lists of laws are ``Strength`` in cases/model/materials.py
+and ``LAWS`` in worker/materials/models.py.
 """
 
 import math
@@ -12,19 +13,20 @@ from typing import ClassVar
 from ..model.tables import Model
 
 Likely = tuple[str, str, float]
-"""Value of a constant for a check: key of the law, quantity of the key (``cases.warnings.plausible.LIKELY``), and
-value."""
+"""A value to be compared with its usual range: key of the law, quantity of the key
+(``cases.warnings.plausible.LIKELY``), and value."""
 Wrong = tuple[str, float, str]
-"""Error in a constant: key of the law, its value, and the error."""
+"""An error in a constant: key of the law, value of the key, and text of the error."""
 
 
 class Law(Model):
-    """A law of strength. A subclass names the law in its attribute ``model``."""
+    """A law of strength. Each subclass has an attribute ``model`` with the name of the law."""
 
     model: str
     """Name of the law."""
     nanoseconds: ClassVar[float]
-    """Core time per tet and step of the law in flowing material, ns. Measured with 10,000 to 750,000 tets."""
+    """CPU time of the law per tet and time step while the material flows, ns. The value was measured with 10,000 to
+    750,000 tets."""
     own_pressure: ClassVar[bool] = False
     """Whether the law has its own equation of state and its own largest tensile pressure."""
 
@@ -35,7 +37,7 @@ class Law(Model):
 
     @property
     def melting(self) -> float:
-        """Temperature from which on the strength is 0, K; infinity by default."""
+        """Lowest temperature at which the strength is 0, K; infinity by default."""
         return math.inf
 
     @property
@@ -44,15 +46,17 @@ class Law(Model):
         return False
 
     def flow_stress(self) -> float:
-        """Flow stress at a plastic strain of 0.1, without pressure and rate, Pa."""
+        """Flow stress, Pa, at a plastic strain of 0.1, at zero pressure and at the reference rate."""
         raise NotImplementedError
 
     def problems(self) -> Iterator[Wrong]:
-        """Yields errors for constants of the law that contradict each other; none by default."""
+        """Yields an error for each constant of the law that contradicts another constant; by default the law has no
+        errors.
+        """
         yield from ()
 
     def likely(self, young: float) -> Iterator[Likely]:
-        """Yields values for the comparison with the usual range of solids; ``young``: Young's modulus, Pa. By default a
-        law yields no values.
+        """Yields the values of the law that are compared with the usual ranges of solids. ``young``: Young's modulus,
+        Pa. By default a law yields no values.
         """
         yield from ()

@@ -21,10 +21,10 @@ class MohrCoulomb(Law):
     """Mohr-Coulomb strength of brittle materials: ``(s1 - s3) + (s1 + s3) sin(friction_angle) <= 2 cohesion
     cos(friction_angle)``, with principal stresses s1 >= s2 >= s3, tension positive.
 
-    Plastic flow preserves the volume, except with ``dilation_angle``. Tension above the apex of the yield surface
-    removes the deviatoric stress and leaves the pressure unchanged. Next to a face at which a shock starts, the first
-    20 tets flow too much: up to half of their plastic strain is an error with averaged nodal pressure; the error is
-    smaller with ``pressure = "standard"`` and with a load that rises over some time steps.
+    Plastic flow preserves the volume, except with ``dilation_angle``. Tension beyond the apex of the yield surface sets
+    the deviatoric stress to 0 and leaves the pressure unchanged. Next to a face at which a shock starts, the first 20
+    tets flow too much: with averaged nodal pressure up to half of their plastic strain is an error. The error is
+    smaller with ``pressure = "standard"``, and with a load that increases over some time steps.
     """
 
     model: Literal["mohr_coulomb"]
@@ -34,9 +34,9 @@ class MohrCoulomb(Law):
     friction_angle: Annotated[Angle, AfterValidator(_acute)]
     """Angle of internal friction, such as ``"55 deg"``; at least 0 and below 90 deg."""
     dilation_angle: Annotated[Angle, AfterValidator(_acute)] = 0.0
-    """Dilation angle psi: plastic flow increases the volume by sin(psi) of the shear, until failure. 0: no volume
-    change; equal to ``friction_angle`` (the largest value): associated flow. The key ``dilation_angle`` must not be
-    combined with ``eos``."""
+    """Dilation angle psi: plastic flow increases the volume by sin(psi) times the shear strain, until failure. 0: the
+    volume does not change. The largest value, ``friction_angle``, makes the flow associated. The key ``dilation_angle``
+    must not be combined with ``eos``."""
     strength_cap: Annotated[Stress, Positive] | None = None
     """Largest difference s1 - s3 of the principal stresses, at any pressure. Default: s1 - s3 has no limit."""
     failure_strain: Annotated[Ratio, Positive] | None = None

@@ -38,10 +38,10 @@ class Primitive(Model):
     split: Literal[5, 6] = 6
     """With ``generator = "structured"``: number of tets per hexahedral cell."""
     sector: Literal["full", "half", "quarter"] = "full"
-    """Modelled part of the body, for scenes with planes of symmetry. ``half``: the positive side of the centre (box: of
-    the origin) in the first direction across ``axis``; ``quarter``: the positive side in both directions across
-    ``axis``. The directions across ``axis`` in cyclic order are x, y for z; y, z for x; z, x for y. Each plane of
-    symmetry also needs a boundary ``symmetry``."""
+    """Modelled part of the body, for scenes with planes of symmetry. ``half``: only the positive side of the centre
+    (box: of the origin) in the first direction across ``axis``. ``quarter``: only the positive sides in both directions
+    across ``axis``. The directions across ``axis`` in cyclic order are x, y for z; y, z for x; z, x for y. Each plane
+    of symmetry also needs a boundary ``symmetry``."""
     grading: Grading | None = None
     """Coarser tets far from a region of interest, with ``generator = "gmsh"``."""
 
@@ -77,9 +77,9 @@ class Symmetric(Primitive):
     """Keys of primitives that are symmetric about the planes of a sector."""
 
     aligned: bool | None = None
-    """Whether a half or a full body is meshed as quarters with common faces, with ``generator = "gmsh"``. With ``true``
-    the tets on the axis are as small as those of a quarter; with ``false`` up to twice as large. Default: ``true`` for
-    parts with ``erosion``, so that a rod penetrates equally deep in a full model and in a quarter
+    """Whether a half or full body is meshed as quarters that have common faces, with ``generator = "gmsh"``. ``true``:
+    the tets on the axis are as small as those of a quarter; ``false``: they are up to twice as large. Default: ``true``
+    for parts with ``erosion``, so that a rod penetrates equally deep in a full model and in a quarter
     (docs/theory/erosion.md)."""
 
 
@@ -106,7 +106,7 @@ class Sphere(SphereForm, Symmetric):
 
 
 class Drawn(Primitive):
-    """A primitive that only gmsh can mesh."""
+    """Keys of a primitive that only gmsh can mesh."""
 
     generator: Literal["gmsh"] = "gmsh"
     """Mesh generator; gmsh is the only generator for this shape."""
@@ -144,9 +144,9 @@ class Loose(Primitive):
     """
 
     generator: Literal["structured"] = "structured"
-    """The key has no effect on this shape."""
+    """Mesh generator. The key has no effect on this shape."""
     sector: Literal["full"] = "full"
-    """Value ``full``: the whole body is always modelled."""
+    """Modelled part of the body. This shape is always modelled completely."""
     grading: None = None
     """This key is not available for this shape."""
 
@@ -188,34 +188,33 @@ class Shards(Loose):
 
     @property
     def axis(self) -> Axis:
-        """Axis of the shape. All shapes have this attribute; the axis of single tets has no effect."""
+        """Axis of the shape, which all shapes have; the axis of single tets has no effect."""
         return "z"
 
 
 class MeshFile(Measured):
-    """A tet mesh from a file: gmsh .msh 4.1 or 2.2, Abaqus .inp, LS-DYNA .k, .key or .dyn, Radioss .rad, VTK .vtu.
-    docs/howto/meshes.md describes which elements and sets are read. The page docs/howto/meshes.md describes which
-    elements and sets are read.
+    """A tet mesh from a file: gmsh .msh 4.1 or 2.2, Abaqus .inp, LS-DYNA .k, .key or .dyn, Radioss .rad, VTK .vtu. The
+    page docs/howto/meshes.md describes which elements and sets are read.
     """
 
     shape: Literal["file"]
     """Selects a mesh file."""
     path: str
     """Path of the file, relative to the folder of the case. Commands that submit the case to a server also send the
-    file; ``sha256`` identifies the file there (docs/howto/meshes.md)."""
+    file, which the server finds by its ``sha256`` (docs/howto/meshes.md)."""
     unit: Annotated[Length, Positive]
     """Length unit of the coordinates in the file, such as ``"1 mm"``."""
     group: str | None = None
-    """Group of elements of which the part consists; all elements if absent. gmsh: a physical group by name or number.
-    Abaqus: an element set (``Bar-1.Set-1`` for a set of an instance or a part), an instance or a part. LS-DYNA and
-    Radioss: a part, a set or a subset."""
+    """Group of elements that forms the part; default: all elements of the file. gmsh: a physical group by name or
+    number. Abaqus: an element set (``Bar-1.Set-1`` for a set of an instance or a part), an instance or a part. LS-DYNA
+    and Radioss: a part, a set or a subset."""
     second_order: Literal["auto", "corners", "eight"] = "auto"
     """Treatment of tets with 10 nodes. ``corners``: each tet with 10 nodes becomes one tet of its 4 corners. ``eight``:
     each tet with 10 nodes becomes eight tets of 4 nodes. ``auto``: ``eight`` if the corners alone would lose more than
     0.1 % of the volume, otherwise ``corners``; a warning reports the choice."""
     sha256: Sha256 | None = None
-    """SHA-256 hash of the file, 64 hexadecimal digits. A file whose hash differs from ``sha256`` is refused. Commands
-    that send the file add ``sha256``; a server requires ``sha256``. Default: the hash is not checked."""
+    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Commands that send the file
+    to a server add this key, because a server requires it. Default: the hash is not checked."""
 
 
 Mesh = Annotated[

@@ -1,5 +1,6 @@
-"""The models of bonds: two parts that are joined at a common interface, permanently or up to a strength and an
-energy."""
+"""The models of bonds: two parts that are joined at an interface, permanently or up to a strength and a fracture
+energy.
+"""
 
 from typing import Annotated, Literal
 
@@ -9,9 +10,9 @@ from ..units import FractureEnergy, Length, Stress
 from .tables import Model, Name, Positive
 
 GAP = 0.1
-"""Largest bonded distance divided by the size of the smaller of two faces (square root of twice its area), if the case
-gives no distance. The chosen value is twice the distance between the chords of a circle of 16 sides and the circle,
-0.05 of a side."""
+"""Largest distance of bonded faces, divided by the size of the smaller face (square root of twice its area), for a bond
+whose case gives no ``gap``. The chosen value is twice the largest distance between a circle and the sides of a polygon
+of 16 sides in it, which is 0.05 of a side."""
 
 
 class Bonded(Model):
@@ -23,14 +24,15 @@ class Bonded(Model):
     strength: Annotated[Stress, Positive] | None = None
     """Tensile strength: the interface breaks at this normal traction. Default: the bond never breaks."""
     shear_strength: Annotated[Stress, Positive] | None = None
-    """Shear strength of the interface. Default: ``strength``. Under tension and shear together the interface breaks
-    where ``(t_n / strength)^2 + (t_s / shear_strength)^2`` reaches 1; compression has no effect."""
+    """Shear strength of the interface. Default: ``strength``. Under combined tension and shear the interface breaks
+    where ``(t_n / strength)^2 + (t_s / shear_strength)^2`` reaches 1, with the normal traction t_n and the shear
+    traction t_s. Compression has no effect."""
     energy: Annotated[FractureEnergy, Field(ge=0)] = 0.0
     """Fracture energy in tension, per area of the interface: after the break the traction falls linearly with the
     opening. 0: the traction is 0 as soon as the interface breaks."""
     shear_energy: Annotated[FractureEnergy, Field(ge=0)] | None = None
-    """Fracture energy in shear, per area of the interface. Default: ``energy``. The fracture energies in tension and in
-    shear are either both 0 or both above 0."""
+    """Fracture energy in shear, per area of the interface. Default: ``energy``. Either both fracture energies
+    (``energy`` and ``shear_energy``) are 0, or both are above 0."""
 
     @property
     def breaks(self) -> bool:
@@ -39,12 +41,12 @@ class Bonded(Model):
 
     @property
     def cohesive(self) -> bool:
-        """Whether the bond absorbs energy when it breaks."""
+        """Whether the bond absorbs fracture energy when it breaks."""
         return self.breaks and self.energy > 0.0
 
     @property
     def strengths(self) -> tuple[float, float]:
-        """Returns the strength in tension and the strength in shear, Pa, of a bond that can break."""
+        """Returns the tensile strength and the shear strength, Pa, of a bond that can break."""
         assert self.strength is not None
         return self.strength, self.strength if self.shear_strength is None else self.shear_strength
 
@@ -67,21 +69,22 @@ class SharedBond(Bonded):
 class TiedBond(Bonded):
     """A bond of two parts whose meshes do not match at the interface. The nodes of the part with the smaller faces are
     tied to faces of the other part, and are moved onto these faces at the start. One of the parts may be rigid: the
-    nodes of the deformable part are then tied to the faces of the rigid part, and follow its motion. Meshes that match
-    may be tied as well, such as two groups of one file with common nodes, one of them rigid.
+    nodes of the deformable part are then tied to the faces of the rigid part, and follow its motion. Two parts whose
+    meshes match at the interface may be tied as well, such as two groups of one file with common nodes, one of them
+    rigid.
 
     After the interface has broken, the fracture energy G of mixed tension and shear is given by ``1 / G = (1 - B) /
-    energy + B / shear_energy``, where B is the fraction of the work that is done in shear. An open interface closes
-    without resistance, and carries tension again beyond its largest opening; slip is permanent. Contact ignores the
-    pairs of nodes and faces that the bond ties.
+    energy + B / shear_energy``, where B is the fraction of the work that is done in shear. After the break, an open
+    interface closes without resistance; it carries tension again beyond its largest opening; slip is permanent. Contact
+    ignores the pairs of nodes and faces that the bond ties.
     """
 
     kind: Literal["tied"]
     """Selects a bond with tied nodes."""
     gap: Annotated[Length, Field(ge=0)] | None = None
-    """Largest distance between bonded faces; the nodes of one part are moved by this distance onto the other part.
-    Default: a tenth of the size of the smaller face; the size of a face is the square root of twice its area. Faces at
-    a larger distance are not bonded, and a warning gives their number."""
+    """Largest distance between bonded faces. The nodes of one part are moved by up to this distance onto the faces of
+    the other part. Default: a tenth of the size of the smaller face; the size of a face is the square root of twice its
+    area. Faces at a larger distance are not bonded, and a warning gives their number."""
 
 
 Bond = Annotated[SharedBond | TiedBond, Field(discriminator="kind")]

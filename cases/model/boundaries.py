@@ -9,14 +9,14 @@ from .motion import Spin
 from .tables import Axis, Direction, Model, Name, Point, SetName, Velocity
 
 Course = tuple[tuple[Time, Ratio], ...]
-"""Pairs of a time and a factor."""
+"""A function of time: pairs of a time and a factor."""
 
 
 class Symmetry(Model):
     """A plane of symmetry ``axis = at``, without friction. Nodes that start on the plane of symmetry stay on it; nodes
     that move towards the plane are in contact with their mirror image. No node passes the plane of symmetry. The plane
-    of symmetry reflects free nodes (nodes without tets). A crack cannot open in the plane of symmetry: half of a body
-    that fractures in its middle is not equivalent to the full body.
+    of symmetry reflects free nodes (nodes without tets). A crack cannot open in a plane of symmetry: half of a body
+    that fractures in its middle does not behave as the full body.
     """
 
     kind: Literal["symmetry"]
@@ -29,14 +29,14 @@ class Symmetry(Model):
     """Names of the parts to which the plane of symmetry applies; all parts if empty."""
     on: SetName | None = None
     """Name of a node set or a surface in the mesh file of the parts ([howto/meshes.md](../howto/meshes.md)). Exactly
-    the nodes of the set start on the plane, up to a hundredth of the shortest edge off it; all other nodes are beside
-    the plane, even if they touch it, as on the faces of a crack. Default: the nodes that are on the plane within
-    rounding errors."""
+    the nodes of the set are on the plane of symmetry; at the start they may be up to a hundredth of the shortest edge
+    away from it. All other nodes are beside the plane even if they touch it, as on the faces of a crack. Default: the
+    nodes that are on the plane within rounding errors."""
 
 
 class Wall(Model):
-    """A rigid wall that nodes cannot pass: a plane, a cylinder or a sphere. The wall is fixed, has a prescribed motion,
-    or is free with a ``mass``; it does not rotate, and does not limit the time step.
+    """A rigid wall that nodes cannot pass: a plane, a cylinder or a sphere. The wall is fixed, or has a prescribed
+    motion, or moves freely with a ``mass``. A wall does not rotate and does not limit the time step.
     """
 
     kind: Literal["wall"]
@@ -59,13 +59,13 @@ class Wall(Model):
     """With ``shape = "cylinder"`` or ``"sphere"``: whether the bodies are outside or inside of the wall's surface."""
     velocity: Velocity = (0.0, 0.0, 0.0)
     """Velocity of the wall. Without ``mass`` the velocity is prescribed during the whole run, and the work of the wall
-    is external work; with ``mass`` it is the initial velocity."""
+    counts as external work. With ``mass`` it is the initial velocity."""
     course: Course = ()
-    """Factor of ``velocity`` over time, as pairs of time and factor (see ``kind = "velocity"``). The key ``factor``
+    """Factor of ``velocity`` over time, as pairs of time and factor (see ``kind = "velocity"``). The key ``course``
     must not be combined with ``mass``."""
     mass: Annotated[Mass, Field(gt=0)] | None = None
-    """Mass of a free wall, whose velocity only the impulses of the bodies change. Default: the wall has no mass, and
-    its velocity is prescribed."""
+    """Mass of a wall that moves freely: only the impulses of the bodies change its velocity. Default: the wall has no
+    mass, and its velocity is prescribed."""
     parts: tuple[Name, ...] = ()
     """Names of the parts that the wall stops; all parts if empty."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
@@ -135,8 +135,8 @@ class Gravity(Model):
     """Factor of the acceleration over time, as pairs of time and factor (see ``kind = "velocity"``). Default: the
     acceleration is constant from the start, which makes bodies at rest vibrate; a ramp avoids the vibration."""
     parts: tuple[Name, ...] = ()
-    """Names of the parts on which the acceleration acts; all parts if empty. If ``shared`` bonds join parts to one
-    body, name either all parts of this body or none of them."""
+    """Names of the parts on which the acceleration acts; all parts if empty. If ``shared`` bonds join several parts to
+    one body, name either all of these parts or none of them."""
 
 
 class Around(Model):
@@ -159,11 +159,12 @@ class Traction(Model):
     """A distributed load on free faces of the parts: on the faces whose three nodes start in the region (box, cylinder
     and set), or on the whole surface if no region is given. A load has either ``stress`` or ``pressure``.
 
-    The load is a force per initial area with a constant direction; a pressure with ``follows`` acts on the deformed
-    surface. A face is loaded until its tet is deleted or, with ``follows``, until its tet has separated from all
-    others, whichever is first. Faces that become free during the run, and faces on a plane of symmetry, are not loaded.
-    Nodes outside of the region count as inside if their distance is at most a hundredth of the shortest edge of their
-    part. ``conoid validate`` prints the approximate loaded area; the run warns if the area in the mesh differs from it.
+    The load is a force per initial area in a constant direction. With ``follows`` a pressure acts on the deformed
+    surface. A face is loaded until its tet is deleted. With ``follows`` the load also ends when the tet has separated
+    from all other tets. Faces that become free during the run, and faces on a plane of symmetry, are not loaded. Nodes
+    outside of the region count as inside if their distance is at most a hundredth of the shortest edge of their part.
+    ``conoid validate`` prints the approximate loaded area. The run gives a warning if the area in the mesh differs from
+    it.
     """
 
     kind: Literal["traction"]

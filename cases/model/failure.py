@@ -13,9 +13,9 @@ class Erosion(Model):
     part may have both ``erosion`` and ``fracture``.
 
     A tet that exceeds a limit of strain or damage is deleted within ten time steps; a tet that exceeds another limit is
-    deleted at once. The elastic energy of a deleted tet is booked as eroded energy. In a body that can break, by
-    ``fracture`` or by a bond with ``strength``, the remaining tets are connected only through faces: nodes separate
-    where a deletion leaves a connection through an edge or a node.
+    deleted at once. The elastic energy of a deleted tet is counted as eroded energy. In a body that can break, by
+    ``fracture`` or by a bond with ``strength``, the remaining tets stay connected only through common faces: where a
+    deletion leaves tets connected only through an edge or a node, their nodes separate.
     """
 
     plastic_strain: Annotated[Ratio, Positive] | None = None
@@ -28,10 +28,10 @@ class Erosion(Model):
     """Smallest stable time step of a tet divided by the first time step of the run. A larger value makes the run
     cheaper and deletes more tets."""
     nodes: Literal["strike", "particles", "remove"] = "strike"
-    """Treatment of free nodes, which have lost all tets and are particles with mass and without volume. ``strike``: a
-    free node moves on, and is deleted after its contact with a face. ``particles``: a free node is never deleted; many
-    free nodes can gather on a line and dig a hole that real material would not dig. ``remove``: a free node is deleted
-    at once. The mass, momentum and energy of deleted nodes are recorded in the balances."""
+    """Treatment of free nodes: nodes that have lost all tets are particles with mass and without volume. ``strike``: a
+    free node moves on, and is deleted after its contact with a face. ``particles``: a free node is never deleted. Many
+    free nodes can gather on a line, and then dig a hole that real material would not dig. ``remove``: a free node is
+    deleted at once. The balances contain the mass, momentum and energy of deleted nodes."""
 
 
 class Fracture(Model):
@@ -43,11 +43,11 @@ class Fracture(Model):
     """Behaviour of a broken facet. ``instant``: a broken facet carries no traction. ``cohesive``: the traction of a
     broken facet falls linearly with the opening and absorbs the fracture energy (Camacho and Ortiz 1996)."""
     shear_weight: Annotated[Ratio, Field(ge=0)] | None = None
-    """Weight beta_tau of the shear traction in the effective traction ``sqrt(<t_n>^2 + beta_tau t_s^2)``, which is
-    compared with the strength. Default: 0 for ``instant`` (the largest normal traction decides), 1 for ``cohesive``;
-    the model ``cohesive`` needs a weight above 0. With the weight 1, shear alone breaks a facet at the tensile
-    strength: material that is compressed across the crack, such as a disc between platens, breaks early unless
-    ``friction`` prevents it."""
+    """Weight beta_tau of the shear traction t_s in the effective traction ``sqrt(<t_n>^2 + beta_tau t_s^2)``, which is
+    compared with the strength; <t_n> is the tensile normal traction. Default: 0 for ``instant`` (the largest normal
+    traction decides), 1 for ``cohesive``; the model ``cohesive`` needs a weight above 0. With the weight 1, shear alone
+    breaks a facet at the tensile strength: material that is compressed across the crack, such as a disc between
+    platens, then breaks too early unless ``friction`` prevents it."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
     """Coefficient of internal friction: under a compressive traction |t_n| the shear traction is reduced by
     ``friction * |t_n|``."""
@@ -56,12 +56,12 @@ class Fracture(Model):
     from the stress of the two tets, and from the stress of the three nodes, each a volume-weighted mean over the tets
     around the node; both tractions must exceed the strength. The method ``nodes`` gives smoother fracture."""
     delay: Annotated[Ratio, Field(ge=0)] = 1.0
-    """Factor of the delay ``t_c = delay * density * c * energy / strength^2`` during which a facet must be
-    overstressed. 0: the facet breaks in the step in which it exceeds the strength. The published criterion is printed
-    with the factor 0.5; the equations of the same paper give 1."""
+    """Factor ``delay`` of the time ``t_c = delay * density * c * energy / strength^2`` for which a facet must be above
+    its strength before it breaks; c is the wave speed. 0: the facet breaks in the step in which it exceeds the
+    strength. The published equation of this criterion has the factor 0.5; the derivation in the same paper gives 1."""
     order: Literal["simultaneous", "local_maximum"] = "simultaneous"
     """Choice of the facets that break in one time step. ``simultaneous``: all facets that fulfil the criterion break.
-    ``local_maximum``: of all facets with a common node only the facet with the largest overstress breaks."""
+    ``local_maximum``: among all facets with a common node, only the facet that exceeds its strength most breaks."""
     resolve: Literal["none", "strength"] = "none"
     """Adaptation of the strength to the mesh. ``strength``: reduces the strength until ``resolution`` elements fit in
     the cohesive zone; the fracture energy is unchanged."""

@@ -117,11 +117,11 @@ class OgiveForm(Model):
     shank: Annotated[Length, Field(ge=0)] = 0.0
     """Length of the cylindrical shank behind the nose."""
     crh: Annotated[Ratio, Field(ge=0.5, le=1000)] | None = None
-    """Calibre radius head: radius of the arc of the ogive divided by the diameter. A tangent ogive with a calibre
-    radius head of 0.5 is a hemisphere."""
+    """Calibre radius head (CRH): radius of the arc of the ogive divided by the diameter of the shank. A tangent ogive
+    with a CRH of 0.5 is a hemisphere."""
     nose: Annotated[Length, Positive] | None = None
     """Length of the nose up to its sharp tip. At least one of ``crh`` and ``nose`` is required. If both are given,
-    ``crh`` must be at least that of the tangent ogive, (nose / D)^2 + 1/4, D the diameter."""
+    ``crh`` must be at least that of the tangent ogive, (nose / D)^2 + 1/4, with the diameter D of the shank."""
     tip_radius: Annotated[Length, Field(ge=0)] = 0.0
     """Radius of a sphere that rounds the tip, tangent to the arc; the sphere shortens the nose. 0: no rounding. The key
     ``tip_radius`` must not be combined with ``meplat``."""

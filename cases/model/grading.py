@@ -9,12 +9,12 @@ from .tables import Axis, Model, Point, Positive
 
 
 class Grading(Model):
-    """A graded mesh: ``element_size`` up to the distance ``near``, ``far_size`` from the distance ``far`` on, linear
-    between the two distances.
+    """A graded mesh. The element size is ``element_size`` up to the distance ``near`` and ``far_size`` from the
+    distance ``far`` on; it is linear between the two distances.
 
     Distances are measured from the point ``origin``; with ``axis``, from the line through ``origin``; with ``normal``,
-    from the plane through ``origin``; with ``radius``, from the surface of the sphere (with ``axis``: cylinder) around
-    ``origin``, to both sides; with ``surface``, from the surface of the body.
+    from the plane through ``origin``; with ``radius``, to both sides from the surface of a sphere (with ``axis``: of a
+    cylinder) around ``origin``; with ``surface``, from the surface of the body.
     """
 
     origin: Point = (0.0, 0.0, 0.0)

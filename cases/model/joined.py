@@ -1,4 +1,4 @@
-"""Bodies of several parts, joined by bonds with shared nodes."""
+"""Parts that form one body because bonds with common nodes join them."""
 
 from typing import Any, Protocol
 
@@ -22,8 +22,8 @@ class Joined(Protocol):
 
 
 def shared_bonds(case: Joined) -> list[tuple[int, SharedBond, int, int]]:
-    """Returns the bonds with shared nodes: the index of each such bond in ``bond``, and the indices of its two parts,
-    the lower index first.
+    """Returns the bonds with common nodes: for each, its index in ``bond`` and the indices of its two parts, the lower
+    index first.
     """
     numbers = {part.name: i for i, part in enumerate(case.parts)}
     found = [(k, bond, sorted(numbers[name] for name in bond.parts)) for k, bond in enumerate(case.bond)
@@ -32,8 +32,8 @@ def shared_bonds(case: Joined) -> list[tuple[int, SharedBond, int, int]]:
 
 
 def bodies(case: Joined) -> list[int]:
-    """Returns an array (parts,) with the body of each part. The index of a body is the lowest index of the parts that
-    are joined by shared nodes.
+    """Returns the body of each part, an array (parts,). The index of a body is the lowest index of the parts that bonds
+    with common nodes join.
     """
     of = list(range(len(case.parts)))
     for _, _, i, j in shared_bonds(case):
@@ -43,8 +43,8 @@ def bodies(case: Joined) -> list[int]:
 
 
 def breakable(case: Joined) -> list[bool]:
-    """Returns an array (parts,): whether facets of the body of each part can break. The facets of a body can break if a
-    part of the body, or a bond between two of its parts, can break.
+    """Returns for each part whether facets of its body can break, an array (parts,). The facets of a body can break if
+    a part of the body, or a bond between two of its parts, can break.
     """
     of = bodies(case)
     some = {of[i] for i, part in enumerate(case.parts) if part.fracture is not None}
@@ -53,7 +53,7 @@ def breakable(case: Joined) -> list[bool]:
 
 
 def wearing(case: Joined) -> bool:
-    """Returns whether tets may erode from a body whose facets can break."""
+    """Returns whether the case has a body with breakable facets from which tets may be deleted."""
     return any(breaks and part.erosion is not None for part, breaks in zip(case.parts, breakable(case), strict=True))
 
 
@@ -64,9 +64,9 @@ def cohesive(case: Joined) -> set[int]:
 
 
 def meeting(case: Joined) -> list[bool]:
-    """Returns an array (parts,): whether parts of the same body can be in contact with each other. The parts of a body
-    can be in contact with each other if the body can break, or if one of its parts has self-contact. Parts of one body
-    that cannot separate from each other are not in contact with each other.
+    """Returns for each part whether it can be in contact with other parts of its body, an array (parts,). The parts of
+    a body can be in contact with each other if the body can break, or if one of them has self-contact. Parts that
+    cannot separate from each other need no contact.
     """
     of, names = bodies(case), set(case.self_contact)
     some = {of[i] for i, part in enumerate(case.parts) if part.name in names}

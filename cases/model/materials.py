@@ -59,8 +59,8 @@ class MieGruneisen(Model):
 
 class Scatter(Model):
     """Weibull scatter of the tensile strength. A facet of area A has the strength ``minimum + (strength - minimum) *
-    (-ln(1 - r) * area / A)^(1 / modulus)``, with r in [0, 1) from a hash of ``seed`` and the facet's global id:
-    every run has the same strengths.
+    (-ln(1 - r) * area / A)^(1 / modulus)``. The number r in [0, 1) is a hash of ``seed`` and of the global id of the
+    facet, so that every run has the same strengths.
     """
 
     modulus: Annotated[Ratio, Positive]
@@ -75,7 +75,7 @@ class Scatter(Model):
 
 
 class Brittle(Model):
-    """Fracture of facets between tets. If the material has no ``strength`` (a law of plastic flow), it can break in
+    """Fracture of facets between tets. Material without the table ``strength`` (a law of plastic flow) breaks in
     tension only, and resists any compression.
     """
 
@@ -103,8 +103,8 @@ class Material(Model):
     Use an equation of state for pressures above some percent of the bulk modulus. The key ``eos`` must not be combined
     with ``johnson_holmquist``, which has its own equation of state."""
     spall: Annotated[Stress, Positive] | None = None
-    """Spall strength: largest tensile pressure. At this tension pores open, and the opening absorbs work; the pores
-    close again without resistance before the material is compressed. Default: the tensile pressure has no limit. The
+    """Spall strength: largest tensile pressure. When the tension reaches the spall strength, pores open, which absorbs
+    work; under compression the pores first close without resistance. Default: the tensile pressure has no limit. The
     key ``spall`` must not be combined with ``johnson_holmquist``, which has its own limit."""
     brittle: Brittle | None = None
     """Fracture of facets; required for parts with the table ``fracture``. Default: the material cannot fracture."""
@@ -113,5 +113,5 @@ class Material(Model):
 
     @property
     def bulk(self) -> float:
-        """Bulk modulus at rest, Pa: density c0^2 with an equation of state."""
+        """Bulk modulus of the undeformed material, Pa; with an equation of state it is density c0^2."""
         return self.elastic.bulk if self.eos is None else self.density * self.eos.c0**2

@@ -18,7 +18,7 @@ ProbeField = Literal[
     "damage_max", "temperature_max",
 ]  # fmt: skip
 SUMS = ("mass", "momentum", "kinetic_energy", "centre", "centre_velocity", "residual_velocity", "residual_mass")
-"""Fields that are sums over nodes, without their component."""
+"""Fields that are sums over nodes, without the letter of their component."""
 PEAKS = ("pressure_max", "pressure_min", "mises_max", "plastic_strain_max", "damage_max", "temperature_max")
 """Fields that are largest or smallest values over tets."""
 FRAGMENTS = ("fragment_velocity", "fragment_mass")
@@ -28,15 +28,15 @@ BEYOND = ("residual_velocity", "residual_mass", *FRAGMENTS)
 SHAPES = ("penetration", "hole_diameter", "hole_width", "cone_angle")
 """Fields that are lengths and angles of a body, around or along a line."""
 PUSHES = ("contact_force", "contact_impulse", "wall_force", "wall_impulse")
-"""Fields of forces and impulses on a part, without their component."""
+"""Fields of forces and impulses on a part, without the letter of their component."""
 COURSES = ("wall_position", "wall_velocity")
-"""Fields of the motion of a wall, without their component."""
+"""Fields of the motion of a wall, without the letter of their component."""
 WHOLE = (*PUSHES, *COURSES, *SHAPES, *FRAGMENTS)
 """Fields that are measured on whole parts: they do not use the keys ``low``, ``high`` and ``on``."""
 
 
 def kind(field: str) -> str:
-    """Returns a field without its component, such as ``momentum`` for ``momentum_x``."""
+    """Returns the field without the letter of its component, such as ``momentum`` for ``momentum_x``."""
     bare = field[:-2] if field[-2:] in ("_x", "_y", "_z") else field
     return bare if bare in (*SUMS, *PUSHES, *COURSES, "velocity") else field
 
@@ -58,17 +58,17 @@ class Probe(Model):
 
     **Means**, mass-weighted over the tets whose centre starts in the region: ``stress_*`` (tension positive),
     ``pressure`` (compression positive), ``mises``, ``plastic_strain``, ``damage``, ``temperature``, ``density``,
-    ``internal_energy`` (J/kg), ``velocity_*``. Tets and nodes outside of the box count as inside if their distance is
-    at most a hundredth of the shortest edge of the part.
+    ``internal_energy`` (J/kg), ``velocity_*``. Tets and nodes outside of the box count as inside if their distance from
+    it is at most a hundredth of the shortest edge of the part.
 
     **Peaks**, largest and smallest values over the tets whose centre starts in the region: ``pressure_max``,
     ``pressure_min`` (negative: the largest tension), ``mises_max``, ``plastic_strain_max``, ``damage_max``,
-    ``temperature_max``. Peaks include only the tets that exist at the time of the line: deleted tets do not count.
+    ``temperature_max``. Peaks include only the tets that exist at the time of the history line, not the deleted tets.
 
     **Forces** on the whole part, N, as a mean since the previous line: ``contact_force_*``, normal forces and friction
     from all other bodies or from the part ``by``; ``wall_force_*``, the forces from walls. ``contact_impulse_*`` and
     ``wall_impulse_*``, N s, are the integrals of the forces since the start. The impulses include the whole last time
-    step, but the velocities include only half of this step.
+    step; the velocities include only half of it.
 
     **Motion of a wall**, which the key ``wall`` names; without ``part``: ``wall_position_*``, m, of the ``point`` of
     the wall, and ``wall_velocity_*``, m/s. The force of the bodies on the wall is minus ``wall_force_*`` without
@@ -86,14 +86,15 @@ class Probe(Model):
     tets of a fragment are joined by faces.
 
     **Shapes**: ``penetration``: depth along ``axis``, defined as for the reference ``penetration``. ``hole_width`` and
-    ``hole_diameter``: free opening of the part in the plane ``axis = at`` around the line through ``centre``: twice the
-    smallest distance from the line to material, and the diameter of a circle with the area that is visible from the
-    line. The hole fields use 360 rays, without rays that met no material at the start (behind planes of symmetry); the
-    error is about a tet; 0 while material is on the line, not a number if the opening reaches the edge of the body.
-    ``cone_angle``: full angle of the cone broken out of a plate, 2 arctan((R - r) / thickness) in radians, for one cone
-    per plate. At the high end of ``axis`` (R) and at the low end (r), the radius is that of a circle with the area of
-    the face of the plate that is damaged by more than half or separated from the heaviest fragment; the angle is
-    negative if the wide end is at the low end.
+    ``hole_diameter``: size of the free opening of the part in the plane ``axis = at`` around the line through
+    ``centre``. The width is twice the smallest distance from the line to material. The diameter is that of a circle
+    with the area that is visible from the line. The hole fields use 360 rays from the line, without the rays that met
+    no material at the start (behind planes of symmetry). Their error is about the size of a tet. They are 0 while
+    material is on the line, and not a number if the opening reaches the edge of the body. ``cone_angle``: full angle of
+    the cone broken out of a plate, 2 arctan((R - r) / thickness) in radians, for one cone per plate. R is the radius at
+    the high end of ``axis`` and r the radius at the low end: the radius of a circle with the area of the plate's face
+    that has more than half of the damage or is separated from the heaviest fragment. The angle is negative if the wide
+    end of the cone is at the low end.
     """
 
     name: Name
@@ -145,10 +146,10 @@ class Reference(Model):
     ``stress_max`` (largest |stress component|, Pa): largest value over the part. ``speed_mean``: mass-weighted mean
     velocity of a part along ``axis``, m/s. ``probe_mean``, ``probe_max``, ``probe_min``, ``probe_last``: time mean,
     largest, smallest and last value of a probe between ``since`` and ``until``. ``contact_time``: last time at which a
-    wall or another body exerts a force, s. ``contact_loss``: energy dissipated by contact divided by the initial
-    energy. ``penetration``: thickness of all other parts along ``axis`` in front of the end of the hole that the part
-    has made around the axis through the origin, m; cavities ahead of the hole do not count. ``worst_residual``: largest
-    residual of the energy ledger. The quantities ``extent`` and ``radius`` do not include free nodes.
+    wall or another body exerts a force, s. ``contact_loss``: energy dissipated by contact, divided by the initial
+    energy. ``penetration``: thickness of all other parts in front of the end of the hole that the part has made along
+    ``axis`` through the origin, m. Cavities ahead of the hole do not count. ``worst_residual``: largest residual of the
+    energy ledger. The quantities ``extent`` and ``radius`` do not include free nodes.
     """
 
     quantity: Quantity

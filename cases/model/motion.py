@@ -19,7 +19,7 @@ class Stretch(Model):
     """
 
     centre: Point = (0.0, 0.0, 0.0)
-    """Point of the body that has no velocity."""
+    """Point that the stretching does not move."""
     rate: tuple[Rate, Rate, Rate]
     """Stretching rate along x, y, z: positive values lengthen, negative values shorten."""
 

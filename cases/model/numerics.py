@@ -21,8 +21,8 @@ class Viscosity(Model):
     linear: Annotated[Ratio, Field(ge=0)] = 0.06
     """Coefficient of the linear term, which damps numerical oscillations behind a wave front, but also elastic waves.
     With the coefficient 0.06 a velocity jump of some m/s is followed by oscillations: the tension in the spall plane of
-    a flyer plate is then a third too high. With the coefficient 0.3 the tension in the spall plane is a sixth too
-    high."""
+    a flyer plate experiment is then a third too high. With the coefficient 0.3 the tension in the spall plane is a
+    sixth too high."""
     shock: Annotated[Ratio, Field(ge=0)] = 0.4
     """Increase of the linear coefficient in shocks: a shock front is spread over some tets and does not overshoot."""
     quadratic: Annotated[Ratio, Field(ge=0)] = 1.5
@@ -43,8 +43,9 @@ class Numerics(Model):
     """Bulk viscosity; ``"none"`` switches the bulk viscosity off."""
     dt_safety: Annotated[Ratio, Field(gt=0, le=1)] = 0.9
     """Time step divided by the rigorous stability limit of the tets, ``1 / (c sqrt(sum |grad N|^2))``. Bodies that
-    shatter absorb about 15 % less fracture energy at ``dt_safety`` 0.9 than at 0.6 and below, and make fewer fragments.
-    The effect is larger where the cohesive zone is not resolved, which a warning reports."""
+    break into many fragments absorb about 15 % less fracture energy at ``dt_safety`` 0.9 than at 0.6 and below, and
+    make fewer fragments. The effect is larger where the elements do not resolve the cohesive zone, which a warning
+    reports."""
     dt_growth: Annotated[Ratio, Field(gt=1, le=2)] | None = None
-    """Largest ratio of a time step to the previous time step. Default: 1.05; with ``contact.restitution`` 1.002,
-    because time steps that change with the impacts add energy that nothing dissipates without restitution losses."""
+    """Largest ratio of a time step to the previous time step. Default: 1.05. With ``contact.restitution`` the default
+    is 1.002: time steps that change with the impacts add energy, and impacts without loss do not dissipate it."""

@@ -31,7 +31,8 @@ class CadForm(Model):
     """Path of the file, STEP (ISO 10303-21) or BREP (OpenCASCADE), relative to the folder of the case."""
     unit: Annotated[Length, Positive] | None = None
     """Length unit of the coordinates in the file, such as ``"1 mm"``. A BREP file requires the key ``unit``. A STEP
-    file contains its unit: ``unit`` may be absent, and a value that differs from the unit of the file is refused."""
+    file contains its unit, so that ``unit`` may be absent; a value that differs from the unit of the file is refused.
+    """
     solids: tuple[str | Annotated[Count, Field(ge=1)], ...] = ()
     """Solids to use, by their names in the file or by their numbers from 1 in its order; all solids if empty. Several
     solids are one body: their meshes have common nodes where the solids touch."""
@@ -135,8 +136,8 @@ class CadOperand(CadForm, Turned):
 
 
 class StlOperand(StlForm, Turned):
-    """The interior of a closed surface of triangles (STL). Each triangle stays a face of the body, so that elements are
-    not larger than triangles. The surface has at most 1,500 triangles.
+    """The interior of a closed surface of triangles (STL). Each triangle stays a face of the body, so that no element
+    is larger than the triangles. The surface has at most 1,500 triangles.
     """
 
 
@@ -181,9 +182,7 @@ Place = tuple[int | str, ...]
 
 
 def leaves(form: CombinedForm, place: Place = (), depth: int = 1) -> Iterator[tuple[Place, int, Operand]]:
-    """Yields all operands that are not combinations: the key of each operand below ``place``, its depth, and the
-    operand.
-    """
+    """Yields all operands that are not combinations, each with its key below ``place``, its depth and the operand."""
     for n, each in enumerate(form.of):
         if isinstance(each, CombinedForm):
             yield from leaves(each, (*place, "of", n), depth + 1)

@@ -11,18 +11,18 @@ from ..units import Inertia, Mass
 from .tables import Model, Point
 
 Tensor = tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia]
-"""Names of the components of the inertia tensor: xx, yy, zz, yz, zx, xy."""
+"""The inertia tensor as six components: xx, yy, zz, yz, zx, xy."""
 _ROUNDING = 1e-9
-"""Tolerance of the check of the inertia tensor, relative to its trace. The tolerance is needed because a plate has one
-moment of inertia equal to the sum of the other two, and numbers in text are rounded."""
+"""Tolerance of the check of the inertia tensor, divided by its trace. A plate has one moment of inertia that equals the
+sum of the other two; the tolerance accepts it although numbers in text are rounded."""
 
 
 class Rigid(Model):
     """Mass properties of a rigid part that differ from those of its mesh and density."""
 
     mass: Annotated[Mass, Field(gt=0)] | None = None
-    """Mass of the modelled part of the body (with a sector: mass of the sector). Default: the mass of the mesh. Without
-    ``inertia``, ``mass`` scales the inertia of the mesh."""
+    """Mass of the modelled part of the body; with a sector, the mass of the sector. Default: the mass of the mesh.
+    Without ``inertia``, this mass also scales the inertia of the mesh."""
     centre: Point | None = None
     """Centre of mass at the start, in the coordinates of the case; must be combined with ``inertia``. Default: the
     centre of mass of the mesh."""
@@ -30,12 +30,12 @@ class Rigid(Model):
     """Moments of inertia about the centre of mass, along the axes of the case, at the start: xx, yy, zz, yz, zx, xy,
     the integrals of density times y^2 + z^2, z^2 + x^2, x^2 + y^2, -yz, -zx, -xy. The inertia tensor must be positive
     definite, with no principal moment above the sum of the other two moments. Default: the sum over the nodes of the
-    mesh, each with a quarter of the mass of its tets; the sum exceeds the inertia of the smooth body by a relative
-    amount of the order of (tet size / body size)^2."""
+    mesh, where each tet gives a quarter of its mass to each node. This sum exceeds the inertia of the smooth body by a
+    fraction of about (tet size / body size)^2."""
 
 
 class Flag:
-    """Addition to the JSON schema of a key: ``true`` and ``false`` are also allowed."""
+    """Addition to the JSON schema of a key that also accepts ``true`` and ``false``."""
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Returns the JSON schema with the addition; pydantic calls this method."""
@@ -44,14 +44,14 @@ class Flag:
 
 
 def read_rigid(value: Any) -> Any:
-    """Returns ``true`` as a table without keys, and ``false`` as an absent key."""
+    """Returns ``true`` as a table without keys, and ``false`` as None; returns other values unchanged."""
     if isinstance(value, bool):
         return {} if value else None
     return value
 
 
 def tensor_problems(inertia: Tensor) -> Iterator[str]:
-    """Yields the reasons why no body can have the given moments of inertia."""
+    """Yields the reasons for which no body can have the given moments of inertia."""
     xx, yy, zz, yz, zx, xy = inertia
     if not _minors_above((xx, yy, zz, yz, zx, xy), 0.0):
         yield "must be positive definite: every principal moment above 0"

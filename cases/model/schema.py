@@ -1,4 +1,4 @@
-"""The models of a case: immutable, without unknown keys; every quantity is in SI units after reading.
+"""The models of a case: immutable objects without unknown keys; after reading, every quantity is in SI units.
 
 The function ``parse_case`` in ``cases/load.py`` reads TOML or JSON and reports every error at once. Further models are
 in the modules ``bodies`` (bodies and their meshes), ``motion``, ``materials``, ``boundaries``, ``bonds``, ``failure``
@@ -65,11 +65,11 @@ class Part(Model):
     rigid: Annotated[Rigid | None, BeforeValidator(read_rigid), Flag()] = None
     """Whether the part is rigid: ``true``, or a table with mass, centre of mass and inertia. A rigid part has six
     degrees of freedom and no stress; it costs only the contact of its surface and does not limit the time step. Gravity
-    acts on a rigid part. A plane of symmetry on which a rigid part has nodes, and a boundary that drives all nodes of a
-    rigid part, restrict the motion of the part. A rigid part with one prescribed velocity component can still rotate
+    acts on a rigid part. A plane of symmetry that contains nodes of a rigid part restricts the motion of the part, as
+    does a boundary that drives all of its nodes. A rigid part with one prescribed velocity component can still rotate
     about the axis of this component; with two or three prescribed components it cannot rotate. A plane of symmetry that
-    a rigid part does not touch at the start acts on the part as a wall without friction, with
-    ``contact.restitution``."""
+    a rigid part does not touch at the start acts on the part as a wall without friction, with ``contact.restitution``.
+    """
 
 
 MOST_PARTS = 256

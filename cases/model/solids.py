@@ -11,11 +11,11 @@ from .tables import Axis, Model, Point, Positive, Sha256
 
 
 class Measured(Model):
-    """A body whose dimensions are measured on its mesh."""
+    """Keys of a body whose dimensions are measured on its mesh."""
 
 
 class Meshed(Measured):
-    """A body that gmsh meshes."""
+    """Keys of a body that gmsh meshes."""
 
     element_size: Annotated[Length, Positive]
     """Approximate edge length of the tets. Edges and faces of the body that are shorter than ``element_size`` have
@@ -30,13 +30,13 @@ class Meshed(Measured):
 
 
 class Solid(Meshed):
-    """A body whose geometry is made by OpenCASCADE."""
+    """Keys of a body whose geometry OpenCASCADE makes."""
 
     sector: Literal["full", "half", "quarter"] = "full"
-    """Modelled part of the body, for scenes with planes of symmetry. ``half``: the positive side of ``centre`` in the
-    first direction across ``axis``; ``quarter``: the positive side in both directions across ``axis``. The directions
-    across ``axis`` in cyclic order are x, y for z; y, z for x; z, x for y. Each plane of symmetry also needs a boundary
-    ``symmetry``."""
+    """Modelled part of the body, for scenes with planes of symmetry. ``half``: only the positive side of ``centre`` in
+    the first direction across ``axis``. ``quarter``: only the positive sides in both directions across ``axis``. The
+    directions across ``axis`` in cyclic order are x, y for z; y, z for x; z, x for y. Each plane of symmetry also needs
+    a boundary ``symmetry``."""
     centre: Point = (0.0, 0.0, 0.0)
     """Point through which the planes of a sector pass."""
     axis: Axis = "z"
@@ -73,7 +73,8 @@ class Stl(Meshed):
     unit: Annotated[Length, Positive]
     """Length unit of the coordinates in the file, such as ``"1 mm"``."""
     edge_angle: Annotated[Angle, Field(gt=0, lt=3.1)] = 0.6981317007977318
-    """Largest angle between neighbouring triangles of a smooth surface; at a larger angle the body has an edge."""
+    """Largest angle between neighbouring triangles of a smooth surface. Where the angle is larger, the body gets an
+    edge."""
     sha256: Sha256 | None = None
     """SHA-256 hash of the file, 64 hexadecimal digits. A file whose hash differs from ``sha256`` is refused. Default:
     the hash is not checked."""

@@ -39,16 +39,16 @@ def _hash(value: str) -> str:
 
 
 Sha256 = Annotated[str, AfterValidator(_hash), Field(json_schema_extra={"pattern": "^[0-9a-fA-F]{64}$"})]
-"""SHA-256 hash of a file that a case names, in lower case."""
+"""SHA-256 hash of a file that a case names; it is converted to lower case."""
 
 
 def off(value: Any) -> Any:
-    """Returns None for ``"none"``; returns other values unchanged."""
+    """Returns None for the text ``"none"``, and other values unchanged."""
     return None if value == "none" else value
 
 
 class Switch:
-    """Addition to the JSON schema of a key: ``"none"`` is also allowed."""
+    """Addition to the JSON schema of a key that also accepts ``"none"``."""
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Returns the JSON schema with the addition; pydantic calls this method."""

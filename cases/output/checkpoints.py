@@ -1,4 +1,4 @@
-"""Checkpoints in a run's folder, and the check that they are complete (docs/reference/checkpoints.md).
+"""The checkpoints in the folder of a run, and the check that a checkpoint is complete (docs/reference/checkpoints.md).
 
 ::
 
@@ -19,16 +19,16 @@ from ..reading import whole
 from . import layout
 
 FORMAT = 18
-"""Version of the checkpoint files; 17 added the compression of brittle parts and the heat of deleted tets. Checkpoints
-with another version number cannot be read."""
+"""Version of the checkpoint files. Version 17 added the compression of brittle parts and the heat of deleted tets. A
+checkpoint with another version cannot be read."""
 MANIFEST, SEAL = "manifest.json", "manifest.sha256"
 _FILE = re.compile(r"rank-[0-9]+\.h5")
 _PIECE = 1 << 24
-"""Number of bytes that are hashed at a time."""
+"""Number of bytes that are hashed at once."""
 
 
 class DamagedError(ValueError):
-    """Error: a damaged or incomplete checkpoint; the text gives the reason in one line."""
+    """Error: a checkpoint is damaged or incomplete. The text gives the reason in one line."""
 
 
 class File(msgspec.Struct, frozen=True):
@@ -40,7 +40,7 @@ class File(msgspec.Struct, frozen=True):
 
 
 class Manifest(msgspec.Struct, frozen=True):
-    """The content of a checkpoint; the simulated time ``t`` in s."""
+    """The content of the file manifest.json of a checkpoint; ``t``: simulated time, s."""
 
     format: int
     step: int
@@ -48,11 +48,13 @@ class Manifest(msgspec.Struct, frozen=True):
     case: dict[str, Any]
     files: list[File]
     known: dict[str, Any]
-    """State that all ranks have in common; arrays as ``{"dtype", "values"}``."""
+    """State that all ranks have in common; an array is written as ``{"dtype", "values"}``."""
 
 
 def found(folder: Path) -> list[Path]:
-    """Returns the checkpoints of the run in ``folder``, the latest first, without reading the checkpoints."""
+    """Returns the folders of the checkpoints of the run in ``folder``, the latest first. The checkpoints are not
+    read.
+    """
     try:
         places = [p for p in (folder / layout.CHECKPOINTS).iterdir() if _numbered(p.name) and p.is_dir()]
     except (FileNotFoundError, NotADirectoryError):
@@ -65,14 +67,14 @@ def _numbered(name: str) -> bool:
 
 
 def sealed(manifest: Manifest) -> tuple[bytes, bytes]:
-    """Returns the contents of the two files that describe a checkpoint."""
+    """Returns the contents of manifest.json and manifest.sha256."""
     text = json.dumps(msgspec.to_builtins(manifest)).encode()
     return text, f"{hashlib.sha256(text).hexdigest()}\n".encode()
 
 
 def manifest_of(place: Path) -> Manifest:
-    """Returns the manifest of a checkpoint whose files exist with the right size. Raises DamagedError if the checkpoint
-    is damaged or incomplete.
+    """Returns the manifest of the checkpoint in the folder ``place``, after checking that its files exist with the
+    right size. Raises DamagedError if the checkpoint is damaged or incomplete.
     """
     try:
         text = whole.read(place / MANIFEST)
@@ -103,7 +105,7 @@ def _check(place: Path, made: Manifest) -> None:
 
 
 def check_bytes(place: Path, made: Manifest) -> None:
-    """Checks the sha256 of each file of a checkpoint. Raises DamagedError if a file is damaged."""
+    """Checks the SHA-256 hash of each file of a checkpoint. Raises DamagedError if a file is damaged."""
     for file in made.files:
         try:
             digest = sha256(place / file.name)
@@ -114,7 +116,7 @@ def check_bytes(place: Path, made: Manifest) -> None:
 
 
 def sha256(path: Path) -> str:
-    """Returns the sha256 of a regular file. Raises OSError if the file cannot be read."""
+    """Returns the SHA-256 hash of a regular file. Raises OSError if the file cannot be read."""
     h = hashlib.sha256()
     with whole.opened(path) as file:
         while piece := file.read(_PIECE):

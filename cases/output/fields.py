@@ -1,4 +1,4 @@
-"""The optional fields of frames that a case has: ``damage``, ``fragment``, and the fields of ``run.fields``."""
+"""The fields of frames that only some cases have: ``damage``, ``fragment``, and the fields of ``run.fields``."""
 
 from ..model.joined import cohesive
 from ..model.schema import Case
@@ -12,8 +12,8 @@ def counting(case: Case) -> set[int]:
 
 
 def damageable(case: Case) -> bool:
-    """Whether the case has damage: damage of a law, damage of cohesive facets, or the fraction of the erosion strain
-    that is reached.
+    """Whether the frames of the case have the field ``damage``: damage of a law, damage of cohesive facets, or plastic
+    strain divided by the erosion limit.
     """
     strained = any(part.erosion is not None and part.erosion.plastic_strain is not None for part in case.parts)
     return bool(cohesive(case)) or strained or bool(counting(case))

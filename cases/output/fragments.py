@@ -1,4 +1,5 @@
-"""The table of the fragments of a frame, and its statistics: N(m), laws of size, shares.
+"""The table of the fragments of a frame, and its statistics: distributions of sizes, share of dust, share of the
+largest fragment.
 
 ::
 
@@ -26,14 +27,15 @@ COLUMNS: dict[str, str] = {
     **{f"high_{i}": "m" for i in _AXES},
     "extent": "m", "new_surface": "m^2",
 }  # fmt: skip
-"""Columns of the table of fragments and their units. ``label``: number of the fragment, beginning with 0. When a
-fragment breaks, the piece with the most tets keeps the number, and the other pieces get new numbers. Angular momentum
-and inertia are about the centre of the fragment. Translation, rotation and deformation are fractions of the kinetic
-energy. ``extent``: longest side of the bounding box from ``low`` to ``high``. ``new_surface``: initial area of broken
-faces, both sides of a crack."""
+"""Columns of the table of fragments and their units. ``label``: number of the fragment, counted from 0. When a fragment
+breaks, the piece with the most tets keeps the number, and the other pieces get new numbers. Angular momentum and
+inertia refer to the centre of the fragment. The columns for translation, rotation and deformation contain fractions of
+the kinetic energy of the fragment. ``extent``: longest side of the bounding box between ``low`` and ``high``.
+``new_surface``: initial area of the broken faces of the fragment; a crack between two fragments counts in both."""
 _WHOLE = ("label", "tets", "nodes")
 DUST = 10
-"""Number of tets below which a fragment counts as dust, because its shape is that of its tets."""
+"""Smallest number of tets of a fragment that does not count as dust. The shape of a smaller fragment is that of its
+tets."""
 
 
 def path(folder: Path, index: int) -> Path:
@@ -42,7 +44,7 @@ def path(folder: Path, index: int) -> Path:
 
 
 GENEALOGY = ("frame", "parent", "child", "tets")
-"""Columns of the genealogy of fragments."""
+"""Columns of the table of genealogy: which fragment each new fragment comes from."""
 
 
 def genealogy(folder: Path) -> Path:
@@ -56,8 +58,8 @@ def header() -> list[str]:
 
 
 def read(table: Path) -> list[dict[str, float | int | str]]:
-    """Returns the lines of a table of fragments, by the names of ``COLUMNS``. Raises ValueError if the file has other
-    columns.
+    """Returns the lines of a table of fragments; each line is a mapping from the names of ``COLUMNS`` to values. Raises
+    ValueError if the file has other columns.
     """
     with table.open(newline="", encoding="utf-8") as file:
         lines = list(csv.reader(file))
@@ -74,16 +76,17 @@ def _value(name: str, text: str) -> float | int | str:
 
 @dataclass(frozen=True)
 class Fit:
-    """A distribution with its maximum-likelihood parameter. Of two distributions that are fitted to the same values,
-    the one with the larger likelihood fits better.
+    """A distribution of sizes whose parameter was fitted by maximum likelihood. If two distributions are fitted to the
+    same values, the one with the larger likelihood fits better.
     """
 
     law: str
     """``rayleigh``, ``exponential`` or ``power``."""
     parameter: float
-    """Parameter of the distribution: mode, mean, or exponent of the density."""
+    """Parameter of the distribution: the mode of ``rayleigh``, the mean of ``exponential``, the exponent of the density
+    of ``power``."""
     log_likelihood: float
-    """Sum of ln(density) over the values, with the values in SI."""
+    """Sum of ln(density) over the values in SI units."""
 
 
 def fits(values: Sequence[float]) -> list[Fit]:
@@ -109,7 +112,7 @@ def fits(values: Sequence[float]) -> list[Fit]:
 
 @dataclass(frozen=True)
 class Summary:
-    """Statistics of a table of fragments; dust is included in the masses, not in the distributions."""
+    """Statistics of a table of fragments. Dust is included in the masses but not in the distributions."""
 
     fragments: int
     dust: int
@@ -123,7 +126,7 @@ class Summary:
 
 
 def summary(tets: Sequence[int], masses: Sequence[float], extents: Sequence[float]) -> Summary:
-    """Returns the statistics of the columns of one table; masses in kg, extents in m."""
+    """Returns the statistics of one table from its columns; masses in kg, extents in m."""
     whole = [k for k, count in enumerate(tets) if count >= DUST]
     total = math.fsum(masses)
     dust = math.fsum(m for m, count in zip(masses, tets, strict=True) if count < DUST)

@@ -1,6 +1,6 @@
 """Zenoh key expressions: ``conoid/v1/<owner>/<run>/<class>``.
 
-The key contains the owner, so that access rules apply to each user. The version in the key is a plain ``v1``, because
+The key contains the owner, so that access rules apply to each user. The version in the key is the plain text ``v1``:
 Zenoh wildcards do not match a chunk that starts with ``@``.
 """
 
@@ -23,21 +23,25 @@ def run_prefix(owner: str, run: str) -> str:
 
 
 def message_key(prefix: str, kind: str) -> str:
-    """Returns the key of a message class below a run's prefix. Raises ValueError if the message class is unknown."""
+    """Returns the key of a message class of a run; ``prefix``: prefix of the keys of the run. Raises ValueError if the
+    message class is unknown.
+    """
     if kind not in CLASSES:
         raise ValueError(f"unknown message class {kind!r}; known: {', '.join(CLASSES)}")
     return f"{prefix}/{kind}"
 
 
 def everything(prefix: str) -> str:
-    """Returns the key expression of all messages of a run; with the prefix of an owner, of all messages of the owner's
-    runs.
+    """Returns the key expression that matches all messages of a run; with the prefix of an owner, all messages of the
+    owner's runs.
     """
     return f"{prefix}/**"
 
 
 def alive(prefix: str) -> str:
-    """Returns the key of the Zenoh liveliness token that exists as long as the worker of the run."""
+    """Returns the key of the Zenoh liveliness token of a run; the token exists as long as the worker process of the
+    run.
+    """
     return f"{prefix}/alive"
 
 

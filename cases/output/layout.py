@@ -1,4 +1,4 @@
-"""The files in a run's folder: plain files, complete without the server.
+"""The files in the folder of a run. They are plain files that can be read without the server.
 
 ::
 
@@ -38,27 +38,29 @@ FILES = "files"
 LOGS = "log"
 LAUNCHER_LOG = "launcher.log"
 SUBMISSION = "submission.json"
-"""Name of a file that only the server writes, like ``worker.json``. The folder of a run without a server has neither of
-these two files."""
+"""Name of a file about the submission of a run. Only the server writes this file and ``worker.json``; the folder of a
+run without a server has neither of the two."""
 WORKER = "worker.json"
 JOB = "job.json"
-"""Name of a file that the server or the command line writes at the submission to a batch system."""
+"""Name of the record of a job, which the server or the command line writes when it submits the run to a batch system.
+"""
 JOB_SCRIPT = "job.sh"
 ACCESS = ".telemetry.json"
-"""Name of a hidden file that only its owner can read: network address and token with which the ranks of a job
-publish."""
+"""Name of a hidden file that only its owner can read: the network address and the token with which the ranks of a job
+publish messages."""
 STOP_REQUEST = "stop.request"
-"""Name of the file that requests the final stop of the run; the file stays. The server writes the cause of the stop
-into this file, as a word. If this file does not exist, the stop of a job is an interruption."""
+"""Name of the file that requests the final stop of a run. The worker does not remove it. The server writes the cause of
+the stop into this file, one word. If a job is stopped and this file does not exist, the run is interrupted and will
+continue."""
 INTERRUPTED = "interrupted.json"
 """Name of the preliminary outcome of a run that was interrupted and will continue."""
 ARRAYS = ".arrays"
-"""Folder beside the folders of the runs: one folder per job array, with the script and the list of runs of the
-array."""
+"""Name of a folder beside the folders of the runs. It has one folder per job array, with the script and the list of
+runs of the array."""
 ARRAY = "folders.json"
-"""Name of the list of the run folders of the tasks, in order."""
+"""Name of the file that lists the run folders of the tasks of a job array, in the order of the tasks."""
 LOCK = ".lock"
-"""Name of the lock that rank 0 holds while it writes into the folder."""
+"""Name of the lock file that rank 0 locks while it writes into the folder of the run."""
 
 
 def frame(folder: Path, index: int) -> Path:
@@ -67,8 +69,8 @@ def frame(folder: Path, index: int) -> Path:
 
 
 def set_array(name: str) -> str:
-    """Name of the point array of a set of nodes in a frame. HDF5 separates groups by "/"; therefore the name has U+2215
-    instead of "/".
+    """Name of the point array of a frame that marks the nodes of a set. HDF5 separates groups by "/"; the name
+    therefore has the character U+2215 in place of "/".
     """
     return "set_" + name.replace("/", "\u2215")
 
@@ -89,7 +91,7 @@ def snapshot_tets(folder: Path, n: int) -> Path:
 
 
 def share(folder: Path, n: int, rank: int) -> Path:
-    """Path of the contribution of ``rank`` to snapshot ``n``; the file exists until the snapshot is made."""
+    """Path of the contribution of one rank to snapshot ``n``. The file is removed when the snapshot is made."""
     return folder / SNAPSHOTS / f".{n:06d}.{rank}"
 
 
@@ -99,7 +101,7 @@ def rank_log(folder: Path, rank: int) -> Path:
 
 
 def claim(folder: Path, job_name: str) -> Path:
-    """Path of the file that the first job with a given name creates, with the number of the job. A second job with the
-    same name ends.
+    """Path of the file that the first job with the name ``job_name`` creates; the file contains the number of that job.
+    A second job with the same name finds the file and ends.
     """
     return folder / f".claim-{job_name}"

@@ -1,7 +1,7 @@
-"""The table of a sweep: one line per point; one column per changed key, property of the run, or result.
+"""The table of a sweep (several runs of a case with changed keys). It has one line per run, and columns for the changed
+keys, for properties of the run, and for results.
 
-Values of the table are numbers; the header of a column has the name and the unit. Server, client and page use the same
-table.
+The values are numbers; the header of each column gives its name and its unit. Server, client and page use this table.
 """
 
 import csv
@@ -24,22 +24,24 @@ from ..units import parse_unit, written
 from .history import header
 
 Cell = int | float | str | None
-"""Value of a cell of the table of a sweep; None if unknown."""
+"""A value in the table of a sweep; None if it is unknown."""
 Named = tuple[str, str]
-"""Name of a column and its unit; the unit is empty if there is none."""
+"""Name and unit of a column of the table; the unit is empty if there is none."""
 _VERDICTS = "no", "yes"
 KEY, RUN, RESULT = "key", "run", "result"
 
 _COUNTS = ("fragments", "broken", "eroded")
 _COSTS = {"first_break": "s", "time": "s", "elapsed": "s", "cpu": "s", "steps": "", "elements": "", "nodes": ""}
 _FORMULA = re.compile(r"[=@\t\r]|[+-](?!(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?( [^\W\d][\w*/^ -]*)?$)")
-"""Pattern of the start of a text that a spreadsheet program would compute. The pattern does not match a number with a
-sign, with or without a unit."""
+"""Pattern of the beginning of a text that a spreadsheet program would evaluate as a formula. A number with a sign, with
+or without a unit, does not match."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Point:
-    """A point of a sweep: the changed keys, the run, and its ``results``, which are empty before the end of the run."""
+    """One run of a sweep: the changed keys, the run, and its ``results``; the results are empty until the run has
+    ended.
+    """
 
     values: Mapping[str, Any]
     run: str = ""
@@ -49,7 +51,7 @@ class Point:
 
 
 class Column(msgspec.Struct, kw_only=True, frozen=True):
-    """A column of the table of a sweep; ``kind`` is KEY, RUN or RESULT."""
+    """A column of the table of a sweep. ``kind``: KEY (a changed key), RUN (a property of the run) or RESULT."""
 
     name: str
     unit: str = ""
@@ -63,7 +65,9 @@ class Column(msgspec.Struct, kw_only=True, frozen=True):
 
 
 def table(points: Sequence[Point]) -> list[Column]:
-    """Returns the columns of the table: keys, run, results. A result that no run has gets no column."""
+    """Returns the columns of the table in the order: keys, properties of the run, results. A result that no run has
+    gets no column.
+    """
     keys = dict.fromkeys(key for point in points for key in point.values)
     return [
         *(_key(key, [point.values.get(key) for point in points]) for key in keys),
@@ -84,8 +88,8 @@ def _results(points: Sequence[Point]) -> list[Column]:
 
 
 def results(ended: Outcome | None) -> dict[Named, Cell]:
-    """Returns the results of a run, by name and unit: references; the last, smallest and largest value of each probe;
-    counts, terms of the energy ledger, cost.
+    """Returns the results of a run by name and unit: its references; the last, smallest and largest value of each
+    probe; counts; terms of the energy ledger; cost.
     """
     if ended is None:
         return {}
@@ -104,7 +108,7 @@ def results(ended: Outcome | None) -> dict[Named, Cell]:
 
 
 def names(case: Case) -> dict[str, str]:
-    """Returns the numerical results of a run of a case, with units."""
+    """Returns the names of the numerical results of a run of the case, with their units."""
     probes = [Measured(name=probe.name, value=0.0, unit=FIELD_UNITS[probe.field]) for probe in case.probes]
     fields = {probe.name: probe.field for probe in case.probes}
     checks = [
@@ -118,7 +122,7 @@ def names(case: Case) -> dict[str, str]:
 
 
 def _references(ended: Outcome) -> dict[Named, Cell]:
-    """Value and verdict of each reference; references with equal titles are numbered."""
+    """Returns the value of each reference and whether it is met. References with equal titles are numbered."""
     found: dict[Named, Cell] = {}
     for n, check in enumerate(ended.reference):
         before = sum(each.name == check.name for each in ended.reference[:n])
@@ -139,8 +143,8 @@ def _probes(ended: Outcome) -> dict[Named, Cell]:
 
 
 def _key(key: str, values: Sequence[Any]) -> Column:
-    """Returns the values as numbers in the unit in which they are written if all are quantities of one kind; otherwise
-    as they are written.
+    """Returns the column of a key: numbers in the unit in which the values are written if all are quantities of one
+    kind; otherwise the texts as they are written.
     """
     unit, numbers = in_one_unit(key, values)
     return Column(name=key, unit=unit, kind=KEY, values=numbers)
@@ -148,7 +152,8 @@ def _key(key: str, values: Sequence[Any]) -> Column:
 
 def in_one_unit(key: str, values: Sequence[Any]) -> tuple[str, list[Cell]]:
     """Returns the unit of the values of a key, and the values in this unit. The unit is that of the first value with a
-    unit, otherwise that of a bare number; values of several kinds, or without a number, stay text.
+    unit; if no value has a unit, it is the unit of a bare number. Values of several kinds, and values that are no
+    numbers, stay text.
     """
     texts: list[Cell] = [None if value is None else _text(value) for value in values]
     read = {n: written(value) for n, value in enumerate(values) if value is not None}
@@ -166,8 +171,8 @@ def in_one_unit(key: str, values: Sequence[Any]) -> tuple[str, list[Cell]]:
 
 
 def _scale(unit: str, target: str) -> Fraction:
-    """Returns the factor of ``unit`` over ``target``; a bare number is in SI. Raises ValueError if the units have
-    different dimensions.
+    """Returns the factor that converts a value in ``unit`` to ``target``; a bare number is in SI units. Raises
+    ValueError if the units have different dimensions.
     """
     factor, dimension = parse_unit(unit)
     whole, kind = parse_unit(target)
@@ -189,7 +194,7 @@ def _text(value: Any) -> str:
 
 
 def to_csv(columns: Sequence[Column]) -> str:
-    """Returns the table as CSV text, with a line of names and units; unknown values are empty."""
+    """Returns the table as CSV text whose first line has the names and units; unknown values are empty."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(safe(column.title) for column in columns)
@@ -203,7 +208,7 @@ def rows(columns: Sequence[Column]) -> Iterable[tuple[Cell, ...]]:
 
 
 def safe(value: Cell) -> Cell:
-    """Returns a value of the table in CSV form. A text that a spreadsheet program would compute gets an apostrophe, so
-    that it stays a text.
+    """Returns a value as it is written into a CSV file. A text that a spreadsheet program would evaluate as a formula
+    gets an apostrophe in front, so that it stays a text.
     """
     return f"'{value}" if isinstance(value, str) and _FORMULA.match(value) else value

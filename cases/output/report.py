@@ -1,11 +1,12 @@
-"""Report of a run as one HTML file: a program of the client makes the report, and a server stores it in the run's
-folder.
+"""The report of a run: one HTML file. A program of the client makes it, and a server stores it in the folder of the
+run.
 """
 
 import importlib.util
 
 PROGRAM = "conoid.client.reports"
-"""The program that makes a report: ``python -m conoid.client.reports FOLDER OUT``, one process for each run."""
+"""Module of the program that makes a report: ``python -m conoid.client.reports FOLDER OUT``, one process for each run.
+"""
 NAME = "report.html"
 """Name of the report in the folder of a run."""
 

@@ -1,7 +1,7 @@
-"""Data of an adaptive sweep, which the client reports and the server shows: the searched threshold, the runs, and the
-result.
+"""The report of an adaptive sweep: the threshold that is searched, the runs, and the result. The client makes it and
+the server shows it.
 
-All numbers are in SI units. A report contains all data, so that the next report replaces a report that was lost.
+All numbers are in SI units. Each report contains all data, so that the loss of a report does no harm.
 """
 
 from typing import Annotated
@@ -9,14 +9,14 @@ from typing import Annotated
 import msgspec
 
 MOST_RUNS = 500
-"""Largest number of points of a report; an adaptive sweep makes 40 runs by default (reason of the chosen limit)."""
+"""Largest number of points of a report; an adaptive sweep makes 40 runs by default (reason of the chosen value)."""
 _Word = Annotated[str, msgspec.Meta(max_length=200)]
 _Value = Annotated[str, msgspec.Meta(max_length=200)] | float | bool
 
 
 class SearchPoint(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """A point of an adaptive sweep: value ``x`` of the first key, changed keys, run, and ``value`` of the result.
-    Without a ``value`` the run has not ended, or ``problem`` gives the reason why it has no value.
+    """One run of an adaptive sweep: the value ``x`` of the first key, the changed keys, the run, and the ``value`` of
+    the result. If ``value`` is absent, either the run has not ended, or ``problem`` gives the reason.
     """
 
     x: float
@@ -27,8 +27,8 @@ class SearchPoint(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fiel
 
 
 class Curve(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """The curve through the points: the value at the limit, the standard error of this value, and points of the
-    curve.
+    """The curve that is fitted to the points: its value at the threshold, the standard error of this value, and points
+    of the curve.
     """
 
     law: _Word
@@ -39,12 +39,12 @@ class Curve(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     exponent: float | None = None
     """Exponent p of the fitted law."""
     course: Annotated[list[tuple[float, float, float | None]], msgspec.Meta(max_length=100)] = []
-    """Points of the curve: x, value, and standard error of the value."""
+    """Points of the fitted curve: x, value, and standard error of the value."""
 
 
 class Search(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """The report of an adaptive sweep. The start time ``began`` (Unix time, s) distinguishes a command from a later
-    command that continues the same sweep.
+    """The report of an adaptive sweep. The start time ``began`` (Unix time, s) identifies the command that makes the
+    sweep: a later command may continue the same sweep.
     """
 
     name: _Word
@@ -54,7 +54,7 @@ class Search(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     threshold: float
     result_unit: _Word = ""
     key: _Word
-    """The key whose value is x. The field ``more`` has the keys that vary together with the first key."""
+    """First key that the sweep changes; x is its value. The other keys of the sweep are in ``more``."""
     more: Annotated[list[_Word], msgspec.Meta(max_length=20)] = []
     unit: _Word = ""
     low: float
@@ -62,11 +62,11 @@ class Search(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     tolerance: float
     points: Annotated[list[SearchPoint], msgspec.Meta(max_length=MOST_RUNS)] = []
     bracket: tuple[float, float] | None = None
-    """The two values of x between which the result crosses the threshold once."""
+    """Two values of x; the result crosses the threshold once between them."""
     mixed: tuple[float, float] | None = None
-    """The smallest and the largest x of an interval in which the result crosses the threshold several times."""
+    """Smallest and largest x of an interval in which the result crosses the threshold several times."""
     curve: Curve | None = None
     over: bool = False
-    """Whether the adaptive sweep has ended, so that no further point follows."""
+    """Whether the adaptive sweep has ended: no further runs follow."""
     why: Annotated[str, msgspec.Meta(max_length=1000)] = ""
     """Reason why the sweep ended before the bracket was as narrow as the tolerance."""

@@ -1,4 +1,5 @@
-"""A snapshot of the fragments of a run as one block of bytes, equal in the run's folder, over Zenoh and over HTTP.
+"""A snapshot: the surface and the table of the fragments of a run as one sequence of bytes, the same in a file, over
+Zenoh and over HTTP.
 
 ::
 
@@ -8,8 +9,8 @@
           16 to 16+H  the header, JSON, padded with spaces
           from there  the arrays, each at a multiple of 8 given in the header; little-endian
 
-Each vertex belongs to one fragment, so that fragments can be drawn apart. The page ``docs/reference/snapshots.md``
-describes the arrays.
+Each vertex belongs to exactly one fragment, so that a program can draw the fragments apart from each other. The page
+``docs/reference/snapshots.md`` describes the arrays.
 """
 
 from collections.abc import Mapping
@@ -19,21 +20,21 @@ import msgspec
 
 MAGIC = b"CONOSNAP"
 VERSION = 1
-"""Version of the layout of snapshots; a reader refuses other versions."""
+"""Version of the layout of snapshots. A reader refuses other versions."""
 TYPES = {"uint8": "B", "uint16": "H", "uint32": "I", "int64": "q", "float32": "f", "float64": "d"}
 """Types of arrays, and the letters of the types in Python's module ``struct``."""
 REST = -1
-"""``fragment_id`` of the last table row if this row is the sum of all fragments without a row."""
+"""Value of ``fragment_id`` in the last row of the table if this row is the sum of all fragments that have no row."""
 FIELD = "field:"
 """Prefix of the names of field arrays."""
 _START = 16
 """Number of bytes before the header."""
 _FAR = 1 << 40
-"""An array offset with more digits than any other offset, so that its header is the longest possible."""
+"""An offset with more digits than any real offset; the header with this value is the longest possible."""
 
 
 class Field(msgspec.Struct, kw_only=True, frozen=True):
-    """A field of triangles in 8 bits: 0 means ``low``, 255 means ``high``."""
+    """A field over the triangles, stored in 8 bits: 0 means the value ``low``, 255 means the value ``high``."""
 
     unit: str
     low: float
@@ -41,7 +42,7 @@ class Field(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Array(msgspec.Struct, kw_only=True, frozen=True):
-    """An array of a snapshot; ``offset`` counts from the beginning of the block of bytes."""
+    """An array of a snapshot. ``offset``: position in bytes, from the beginning of the snapshot."""
 
     dtype: str
     shape: list[int]
@@ -55,16 +56,16 @@ class Header(msgspec.Struct, kw_only=True, frozen=True):
     step: int
     t: float
     box: tuple[tuple[float, float, float], tuple[float, float, float]]
-    """Low and high corner of the box: values 0 and 65535 of ``positions``."""
+    """Two corners of a box; the values 0 and 65535 of ``positions`` mean the low and the high corner."""
     ranks: int
     parts: list[str]
     tets: int
     """Number of tets of the whole model."""
     surface_triangles: int
-    """Number of fragments before some fragments were merged or omitted."""
+    """Number of triangles of the surface before some were merged or omitted."""
     fragments_total: int
     fragments_listed: int
-    """Rows of the table without the last row if this row is the sum of other fragments."""
+    """Number of rows of the table, without the last row if that row is the sum of other fragments."""
     fields: dict[str, Field]
     walls: list[tuple[float, float, float]] = []
     """Positions of the walls of the case, m; empty if no wall moves."""
@@ -73,7 +74,7 @@ class Header(msgspec.Struct, kw_only=True, frozen=True):
 
 @dataclass(frozen=True)
 class Column:
-    """An array to be written: a type of ``TYPES``, the shape, and the bytes in C order."""
+    """An array that is to be written: its type (a key of ``TYPES``), its shape, and its bytes in C order."""
 
     dtype: str
     shape: tuple[int, ...]
@@ -84,7 +85,7 @@ _decoder = msgspec.json.Decoder(Header)
 
 
 def pack(header: Header, columns: Mapping[str, Column]) -> bytes:
-    """Returns the block of bytes of a snapshot; fills in ``header.arrays``."""
+    """Returns the bytes of a snapshot, and fills in ``header.arrays``."""
     places = {name: Array(dtype=c.dtype, shape=list(c.shape), offset=_FAR) for name, c in columns.items()}
     room = _rounded(len(_encoded(header, places)))
     blob, size = [], _START + room
@@ -98,8 +99,8 @@ def pack(header: Header, columns: Mapping[str, Column]) -> bytes:
 
 
 def header_of(blob: bytes | memoryview, size: int | None = None) -> Header:
-    """Returns the header of a block of bytes, or of the beginning of a block if ``size`` gives the size of the whole
-    block. Raises ValueError if the data is no snapshot, or is incomplete.
+    """Returns the header of a snapshot. ``blob``: the snapshot or its beginning; ``size``: number of bytes of the whole
+    snapshot if ``blob`` is only its beginning. Raises ValueError if the bytes are no snapshot, or an incomplete one.
     """
     data = memoryview(blob)
     size = len(data) if size is None else size
@@ -119,7 +120,7 @@ def header_of(blob: bytes | memoryview, size: int | None = None) -> Header:
 
 
 def view(blob: bytes | memoryview, array: Array) -> memoryview:
-    """Returns one array of a block as a flat array, without a copy; works on little-endian machines."""
+    """Returns one array of a snapshot as a flat array without copying it, on little-endian machines."""
     flat: memoryview = memoryview(blob)[array.offset : array.offset + size_of(array)]
     return flat.cast(TYPES[array.dtype])  # type: ignore[call-overload, no-any-return]
 

@@ -1,10 +1,10 @@
-"""The text of an LS-DYNA keyword deck: keywords, their cards, and the fields of a card.
+"""The text of an LS-DYNA keyword deck (input file): keywords, their cards, and the fields of a card.
 
 The rules are those of the LS-DYNA Keyword User's Manual, "Getting started": a line that begins with ``*`` is a keyword,
 a line that begins with ``$`` is a comment, every other line is a card of the last keyword. A card has fields of fixed
-widths, or fields between commas. A width below 20 becomes 20 in the long format (``*KEYWORD LONG=Y``, or ``+`` behind a
-keyword); a width below 10 becomes 10 in the format I10 (``*KEYWORD I10=Y``, or ``%`` behind a keyword); ``-`` behind a
-keyword selects the standard format.
+widths, or fields between commas. Every width below 20 becomes 20 in the long format (``*KEYWORD LONG=Y``, or ``+``
+behind a keyword). Every width below 10 becomes 10 in the format I10 (``*KEYWORD I10=Y``, or ``%`` behind a keyword).
+``-`` behind a keyword selects the standard format.
 """
 
 import re
@@ -30,9 +30,7 @@ _PARAMETER = re.compile(r"([IiRrCc])\s*([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
 
 
 class CardError(ConoidError, ValueError):
-    """Error in an LS-DYNA keyword deck. The text of the error is one line, which begins with the place of the error in
-    the deck.
-    """
+    """Error in an LS-DYNA keyword deck. The text of the error is one line that begins with the place in the deck."""
 
 
 class Card(NamedTuple):
@@ -46,7 +44,7 @@ class Card(NamedTuple):
 
 @dataclass(frozen=True)
 class Block:
-    """A keyword and its cards, including empty ones."""
+    """A keyword and its cards, including empty cards."""
 
     name: str
     """Name of the keyword in upper case, without ``*``: ``ELEMENT_SOLID``, ``SET_NODE_LIST_TITLE``."""
@@ -56,18 +54,18 @@ class Block:
     """Name of the included file in the deck; empty for the deck itself."""
     cards: list[Card] = field(default_factory=list)
     least: int = _STANDARD
-    """Smallest width of a field in characters: 0, 10 or 20."""
+    """Smallest width of a field: 0, 10 or 20 characters."""
     remark: str = ""
     """Text in brackets behind the keyword, such as ``ten nodes format``."""
     parameters: Mapping[str, str] = field(default_factory=dict)
-    """Values of ``*PARAMETER`` by name, in lower case."""
+    """Values of the parameters defined by ``*PARAMETER``, by name in lower case."""
 
     def filled(self) -> Iterator[Card]:
         """The cards of the keyword that are not empty."""
         return (card for card in self.cards if card.text.strip())
 
     def parted(self, options: Collection[str]) -> tuple[str, frozenset[str]]:
-        """Returns the name of a keyword without the words of ``options`` at its end, and these words: ``("SET_NODE",
+        """Returns the name of the keyword without the words of ``options`` at its end, and these words: ``("SET_NODE",
         {"TITLE"})``.
         """
         name, found = self.name, set[str]()
@@ -77,25 +75,25 @@ class Block:
         return name, frozenset(found)
 
     def place(self, number: int | None = None) -> str:
-        """Returns the place of a card, or of the keyword, as text: ``line 7`` or ``'sub/mesh.k', line 7``."""
+        """Returns the place of line ``number`` as text: ``line 7`` or ``'sub/mesh.k', line 7``."""
         return placed(self.file, self.number if number is None else number)
 
     def error(self, card: Card | None, text: str) -> CardError:
-        """Returns the error with the place of a card, or of the keyword."""
+        """Returns an error whose text gives the place of the card; without a card, the place of the keyword."""
         return CardError(f"{self.place(card.number if card else None)}: {text}")
 
     def fields(self, card: Card, *widths: int) -> list[str]:
-        """Returns the fields of a card without outer blanks, with parameters replaced by their values; fields beyond
-        the end of the card are empty.
+        """Returns the fields of a card without outer blanks. A parameter is replaced by its value; a field beyond the
+        end of the card is empty.
 
-        Raises CardError if the card has more fields, or if a parameter is undefined.
+        Raises CardError if the card has more fields than ``widths``, or if a parameter is not defined.
         """
         found = self._between_commas(card, widths) if "," in card.text else self._cut(card, widths)
         return [self._valued(card, item) for item in found] if "&" in card.text else found
 
     def whole(self, card: Card, item: str, what: str) -> int:
-        """Reads a whole number from a field; 0 for an empty field. Raises CardError with ``what``, the name of the
-        field, if the field is not a whole number.
+        """Returns the whole number in a field; 0 for an empty field. Raises CardError if the field is not a whole
+        number. ``what``: name of the field in the message.
         """
         if not item:
             return 0
@@ -104,8 +102,8 @@ class Block:
         return int(item.partition(".")[0])
 
     def real(self, card: Card, item: str, what: str) -> float:
-        """Reads a number from a field, also in the forms ``1.5-3`` and ``1D5``; 0 for an empty field. Raises CardError
-        if the field is not a number.
+        """Returns the number in a field, also in the forms ``1.5-3`` and ``1D5``; 0 for an empty field. Raises
+        CardError if the field is not a number.
         """
         if not item:
             return 0.0
@@ -161,15 +159,16 @@ class Deck:
         """Creates the object without opening a file. ``without``: names of keywords whose cards are not stored."""
         self._without = without
         self.included = Included(path)
-        """The files that have been read; the first file is the deck itself."""
+        """All files that have been read; the first one is the deck itself."""
         self.followed: list[Block] = []
-        """The keywords that ``blocks`` has processed itself and not yielded: ``*COMMENT``, ``*INCLUDE``, ``*PARAMETER``
+        """Keywords that ``blocks`` has processed itself and does not yield: ``*COMMENT``, ``*INCLUDE``, ``*PARAMETER``
         and ``*END``."""
         self._parameters: dict[str, str] = {}
 
     def blocks(self) -> Iterator[Block]:
-        """Yields every keyword up to ``*END``, except ``*COMMENT``, ``*INCLUDE`` and ``*PARAMETER``, which are
-        processed in their order in the deck. Raises CardError; raises OSError if the deck itself cannot be opened.
+        """Yields every keyword of the deck up to ``*END`` in the order of the deck, except ``*COMMENT``, ``*INCLUDE``
+        and ``*PARAMETER``, which this function processes itself. Raises CardError; raises OSError if the deck itself
+        cannot be opened.
         """
         return self._of(self.included.start(), "", _STANDARD)
 
@@ -193,7 +192,7 @@ class Deck:
                 yield block
 
     def _plain(self, path: Path, file: str, standing: int) -> Iterator[Block]:
-        """Yields the keywords of one file; ``standing``: smallest width of a field for keywords without suffix."""
+        """Yields the keywords of one file. ``standing``: smallest width of a field of keywords without a suffix."""
         block: Block | None = None
         for number, text in _text(path, file):
             if text.startswith("*"):
@@ -241,8 +240,8 @@ class Deck:
 
 
 def _formatted(block: Block, rest: str) -> Block:
-    """Returns the smallest field width that a line ``*KEYWORD`` sets: ``LONG=Y`` and ``LONG=K`` mean long input,
-    ``LONG=S`` means standard input and long output.
+    """Returns the block with the smallest width that a line ``*KEYWORD`` sets: ``LONG=Y`` and ``LONG=K`` mean long
+    input; ``LONG=S`` means standard input and long output.
     """
     found = {word.upper(): letter.upper() for word, letter in _SETTING.findall(rest)}
     if found.get("LONG", "S") not in "YKS" or found.get("I10", "Y") not in "YN":
@@ -253,7 +252,9 @@ def _formatted(block: Block, rest: str) -> Block:
 
 
 def _names(block: Block) -> Iterator[tuple[str, int]]:
-    """Yields file names and the numbers of their lines; a name that ends with `` +`` continues in the next line."""
+    """Yields the file names in the cards of a keyword with the numbers of their lines. A name that ends with `` +``
+    continues in the next line.
+    """
     whole, first = "", 0
     for card in block.filled():
         first = first if whole else card.number
@@ -268,7 +269,7 @@ def _names(block: Block) -> Iterator[tuple[str, int]]:
 
 
 def _text(path: Path, file: str) -> Iterator[tuple[int, str]]:
-    """Yields the lines that are not comments."""
+    """Yields the lines of a file that are not comments, with their numbers."""
     try:
         for number, text in lines(path):
             if not text.startswith("$"):

@@ -1,8 +1,8 @@
-"""The files that a case names: path, hash, and the location of the file for a run.
+"""The files that a case names: their paths, their hashes, and the places where a run finds them.
 
 Every table below ``parts[].mesh`` that has a ``path`` names a file; the key ``sha256`` of the table is the hash of its
-content. The path is valid on the machine of the case's author. A run of a server, or of ``conoid batch``, has copies of
-the files in its folder, named by their hashes; for such a run the path is only a name.
+content. The path is valid on the machine of the user who wrote the case. A run of a server, or of ``conoid batch``, has
+copies of the files in its folder, which are named by their hashes; such a run does not use the path.
 """
 
 import re
@@ -14,14 +14,16 @@ from typing import Any
 from ..output import layout
 
 HASH = re.compile(r"[0-9a-f]{64}")
-"""A SHA-256 hash as it is written in names and addresses."""
+"""Pattern of a SHA-256 hash in file names and addresses."""
 _ENDING = re.compile(r"\.[a-z0-9]{1,8}")
-"""Pattern of the ending of a file name, which gives the format of the file."""
+"""Pattern of the ending of a file name, which determines the format of the file."""
 
 
 @dataclass(frozen=True)
 class Named:
-    """A file that a case names, and the location of its table in the case, such as ``("parts", 0, "mesh")``."""
+    """A file that a case names. ``location``: the place of the table that names it, such as ``("parts", 0,
+    "mesh")``.
+    """
 
     table: tuple[int | str, ...]
     path: str
@@ -29,14 +31,12 @@ class Named:
 
     @property
     def copy(self) -> str:
-        """Name of the copy in a run's folder; empty if the case has no hash of the file."""
+        """Name of the copy of the file in the folder of a run; empty if the case has no hash of the file."""
         return copy_of(self.path, self.sha256)
 
 
 def files_of(case: Mapping[str, Any]) -> list[Named]:
-    """Returns all files that a case in plain data names, in the order of the case. Values of the case that are not
-    tables, lists or text are ignored.
-    """
+    """Returns the files that a case names, in the order of the case. ``case``: plain data as TOML gives it."""
     parts = case.get("parts")
     meshes = ((n, part.get("mesh")) for n, part in enumerate(_listed(parts)) if isinstance(part, Mapping))
     return [file for n, mesh in meshes for file in _below(mesh, ("parts", n, "mesh"))]
@@ -70,8 +70,8 @@ def copy_of(path: str, sha256: str | None) -> str:
 def located(path: str, sha256: str | None, folder: Path) -> Path:
     """Returns the path of a file for a run whose case is in ``folder``.
 
-    In the folder of a run of a server, the result is the copy of the file in this folder, so that no case reads another
-    path of the server. Elsewhere the result is the copy if it exists, otherwise ``path``, relative to the folder of the
+    If ``folder`` is the folder of a run of a server, the result is the copy in this folder; so no case can read other
+    files of the server. Otherwise the result is the copy if it exists, else ``path``, relative to the folder of the
     case.
     """
     copy = folder / layout.FILES / (copy_of(path, sha256) or "none")

@@ -1,4 +1,6 @@
-"""The files of a deck: the deck itself and the files that it includes, all below the folder of the deck."""
+"""The files of a deck (input file): the deck itself and the files that it includes. All of them must be below the
+folder of the deck.
+"""
 
 import io
 from collections.abc import Callable, Iterator
@@ -8,26 +10,28 @@ from typing import Self
 from . import whole
 
 _DEEPEST, _MOST = 8, 1000
-"""Largest depth of includes, and largest number of files. Decks of whole vehicles have some hundred files, three levels
-deep (reason of the chosen limits)."""
+"""Largest depth of included files, and largest number of files of a deck. Decks of complete vehicles have some hundred
+files, three levels deep (reason of the chosen values)."""
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 LONGEST = 4096
-"""Largest number of characters of a line of cards; the longest format has 200 characters (reason of the chosen
-limit)."""
+"""Largest number of characters of a line with cards. The longest card format has 200 characters (reason of the chosen
+value)."""
 LONGEST_LINE = 65_536
-"""Largest number of characters of a line of values between commas (chosen value). Abaqus allows 256 characters;
+"""Largest number of characters of a line of values between commas (chosen value). Abaqus allows 256 characters, but
 programs that write a set in one line write some thousand characters."""
 
 
 class Included:
-    """The files of a deck that have been read, and the files that are being read."""
+    """The files of a deck that have been read, and the files that are being read at present (a file that includes
+    another one stays open).
+    """
 
     def __init__(self, path: Path) -> None:
         """Creates the object; ``path``: path of the deck."""
         self.files: list[Path] = []
-        """Every file that has been opened, listed once, in the order of opening."""
+        """Every file that has been opened, once, in the order of opening."""
         self.followed: list[Line] = []
-        """The lines that include the files that are being read."""
+        """The lines that include the files that are being read; the deck itself has none."""
         self._path = path
         self._open: list[Path] = []
         self._count = 0
@@ -39,9 +43,9 @@ class Included:
         return self._path
 
     def enter(self, name: str, including: Path) -> Path:
-        """Opens a file that the file ``including`` names, relative to the folder of the deck, otherwise relative to the
-        folder of ``including``. Raises ValueError if the file does not exist, is not below the folder of the deck, or
-        includes itself.
+        """Opens the file ``name`` and returns its path. The name is relative to the folder of the deck; if there is no
+        such file, relative to the folder of the file ``including``. Raises ValueError if the file does not exist, is
+        not below the folder of the deck, or includes itself.
         """
         folder = self._path.resolve().parent
         places = [(start / name.replace("\\", "/")) for start in (folder, including.resolve().parent)]
@@ -64,7 +68,9 @@ class Included:
         return there[0]
 
     def follow(self, name: str, including: Path, line: "Line") -> Path:
-        """Calls ``enter`` for the file that a ``line`` includes. Raises ValueError with the number of the line."""
+        """Opens the file ``name``, which ``line`` of the file ``including`` includes; see ``enter``. Raises ValueError
+        with the number of the line if the file cannot be opened.
+        """
         self.followed.append(line)
         try:
             return self.enter(name, including)
@@ -77,7 +83,7 @@ class Included:
 
 
 class Line(int):
-    """Number of a line in its file; the text of the number is ``7``, or ``7 of mesh.inc`` for an included file."""
+    """Number of a line in its file. Its text is ``7``, or ``7 of mesh.inc`` for an included file."""
 
     file: str
 
@@ -88,20 +94,21 @@ class Line(int):
         return made
 
     def __str__(self) -> str:
-        """Returns the number of the line, and the name of the file that has the line."""
+        """Returns the number of the line as text, with the name of the file if it is an included file."""
         return f"{int(self)} of {self.file}" if self.file else f"{int(self)}"
 
 
 def own(line: int) -> int:
-    """Returns the number of a line of the deck itself; 0 for a line of an included file."""
+    """Returns the number of a line of the deck itself, and 0 for a line of an included file."""
     return 0 if getattr(line, "file", "") else int(line)
 
 
 def flattened(deck: Included, named: Callable[[str], str | None], longest: int = LONGEST) -> Iterator[tuple[Line, str]]:
-    """Yields the lines of a deck; the lines of an included file replace the line that includes it.
+    """Yields the lines of a deck with their numbers. A line that includes a file is replaced by the lines of this file.
 
-    ``named``: function that returns the file that a line includes, None for any other line; ``longest``: largest number
-    of characters of a line. Raises ValueError or OSError.
+    ``named``: function that returns the name of the file that a line includes, or None for any other line. ``longest``:
+    largest number of characters of a line. Raises ValueError if a file is not valid text or cannot be included; raises
+    OSError if the deck cannot be opened.
     """
     return _flat(deck, deck.start(), "", named, longest)
 
@@ -124,8 +131,8 @@ def _flat(
 
 
 def lines(path: Path, longest: int = LONGEST) -> Iterator[tuple[int, str]]:
-    """Yields the lines of a text file without their line ends, with their numbers; the text is UTF-8 if valid,
-    otherwise Latin-1. Raises ValueError if the file is not text, OSError if there is no regular file.
+    """Yields the lines of a text file with their numbers, without line ends. Bytes that are not valid UTF-8 are read as
+    Latin-1. Raises ValueError if the file is not text, and OSError if it is not a regular file.
     """
     with whole.opened(path) as raw, io.BufferedReader(raw) as data:
         if data.peek(2)[:2] in _UTF_16:

@@ -1,8 +1,9 @@
 """The text of an Abaqus input file: keyword lines with their parameters, and data lines.
 
 The rules are those of the Analysis User's Guide, "Input syntax rules": a line that begins with ``*`` is a keyword line,
-a line that begins with ``**`` is a comment. Case and blanks have no meaning outside of quotation marks; a keyword line
-that ends with a comma continues in the next line; the exponent of a number may begin with D; an empty field is 0.
+a line that begins with ``**`` is a comment. Outside of quotation marks, capitals and blanks have no meaning. A keyword
+line that ends with a comma continues in the next line. The exponent of a number may begin with D. An empty field means
+0.
 """
 
 import math
@@ -33,8 +34,8 @@ class InpError(ConoidError, ValueError):
 
 @dataclass(frozen=True)
 class Block:
-    """A keyword line: keyword in upper case without blanks or hyphens, parameters as (word, value or None), line
-    number.
+    """A keyword line. It has the keyword in upper case without blanks or hyphens, the parameters as pairs (word, value
+    or None), and the line number.
     """
 
     word: str
@@ -43,17 +44,17 @@ class Block:
 
 
 class Source:
-    """The lines of an Abaqus input file, read once from the start: a keyword line, then its data lines."""
+    """The lines of an Abaqus input file, read once from the beginning: each keyword line, then its data lines."""
 
     def __init__(self, path: Path) -> None:
         """Opens the file ``path``. Raises InpError if the file is not text."""
         self.included = Included(path)
-        """The files that are read: the first file is ``path``, the others are included (``*INCLUDE, INPUT=``)."""
+        """The files that are read: first ``path``, then the files that it includes (``*INCLUDE, INPUT=``)."""
         self._ahead: tuple[int, str] | None = None
 
     def blocks(self) -> Iterator[Block]:
-        """Yields every keyword line; data lines that were not read are skipped. Raises InpError if a line is
-        invalid.
+        """Yields every keyword line. If the caller has not read the data lines of a keyword, they are skipped. Raises
+        InpError if a line is invalid.
         """
         self._lines = self._useful(self.included.start(), "")
         for number, text in self.data():
@@ -69,7 +70,7 @@ class Source:
                 pass
 
     def data(self) -> Iterator[tuple[int, str]]:
-        """Yields the line number and the text of each data line up to the next keyword, including empty data lines."""
+        """Yields the number and the text of each data line up to the next keyword, including empty lines."""
         if self._ahead is not None:
             return
         for number, text in self._lines:
@@ -79,12 +80,12 @@ class Source:
             yield number, text
 
     def filled(self) -> Iterator[tuple[int, str]]:
-        """Yields the data lines that are not empty."""
+        """Yields the data lines that are not empty, with their numbers."""
         return ((number, text) for number, text in self.data() if text.strip())
 
     def _useful(self, path: Path, name: str) -> Iterator[tuple[int, str]]:
-        """Yields the lines that are not comments; the lines of an included file replace the line that includes the
-        file. ``name``: name of the included file, empty for the deck itself.
+        """Yields the lines that are not comments, with their numbers. A line that includes a file is replaced by the
+        lines of this file. ``name``: name of the included file, empty for the deck itself.
         """
         for line, text in _read(path, name):
             if (wanted := included_by(text)) is None:
@@ -109,7 +110,7 @@ class Source:
 
 
 def _read(path: Path, name: str) -> Iterator[tuple[int, str]]:
-    """Yields the lines of a file that are not comments."""
+    """Yields the lines of one file that are not comments, with their numbers."""
     with path.open("rb") as start:
         if start.read(2) in _UTF_16:
             raise InpError("the file is UTF-16; save it as UTF-8 text")
@@ -129,7 +130,9 @@ def _read(path: Path, name: str) -> Iterator[tuple[int, str]]:
 
 
 def included_by(text: str) -> str | None:
-    """Returns the file that a line ``*INCLUDE, INPUT=mesh.inc`` names; None for any other line."""
+    """Returns the name of the file that a line such as ``*INCLUDE, INPUT=mesh.inc`` includes, and None for any other
+    line.
+    """
     if not _INCLUDE.match(text):
         return None
     values = [value.strip() for word, _, value in (item.partition("=") for item in fields(text)[1:])
@@ -159,8 +162,8 @@ def _parameter(item: str) -> tuple[str, str | None]:
 
 
 def fields(text: str) -> list[str]:
-    """Returns the fields of a line between commas, without outer blanks; a comma in quotation marks does not separate
-    fields.
+    """Returns the fields of a line, which commas separate, without outer blanks. A comma in quotation marks does not
+    separate fields.
     """
     if '"' not in text:
         return [item.strip() for item in text.split(",")]
@@ -175,7 +178,7 @@ def fields(text: str) -> list[str]:
 
 
 def numbers(line: int, text: str) -> list[float]:
-    """Returns the numbers of a data line; 0 for an empty field; a comma at the end of the line adds no field. Raises
+    """Returns the numbers of a data line. An empty field is 0; a comma at the end of the line adds no field. Raises
     InpError if a field is not a number.
     """
     if _NUMBERS.fullmatch(text):
@@ -192,7 +195,9 @@ def numbers(line: int, text: str) -> list[float]:
 
 
 def whole(line: int, item: str) -> int:
-    """Returns the number of a node or element. Raises InpError if the field is not such a number."""
+    """Returns the number of a node or element that a field contains. Raises InpError if the field contains no such
+    number.
+    """
     if not _WHOLE.fullmatch(item) or not int(item):
         raise InpError(f"line {line}: {shortened(item)} is not a number of a node or element; the first one is 1")
     return int(item)
@@ -214,6 +219,6 @@ def is_whole(item: str) -> bool:
 
 
 def shortened(text: str) -> str:
-    """Returns a line in quotation marks, for messages."""
+    """Returns the text of a line in quotation marks for a message, shortened if it is long."""
     bare = text.strip()
     return repr(bare if len(bare) <= _LONGEST else f"{bare[:_LONGEST]}...")

@@ -1,4 +1,4 @@
-"""The material library ``materials.toml``: every constant with its confidence and source."""
+"""The material library ``materials.toml``: each constant with its value, its confidence and its source."""
 
 import tomllib
 from collections.abc import Iterator
@@ -14,15 +14,15 @@ from .similar import nearest
 
 PATH = Path(__file__).parents[1] / "materials.toml"
 Confidence = Literal["paper", "read", "derived", "memory", "assumed"]
-"""Confidence of a constant of a material, in the order of the words: given in the paper on which this project is based;
-read in the named source; computed from other constants; remembered from the literature and not read again; chosen
-without evidence for this alloy."""
+"""Confidence of a constant of the library. ``paper``: given in the paper on which this project is based; ``read``: read
+in the named source; ``derived``: computed from other constants; ``memory``: remembered from the literature and not read
+again; ``assumed``: chosen without evidence for this alloy."""
 CONFIDENCES: tuple[str, ...] = get_args(Confidence)
 
 
 @cache
 def library() -> dict[str, Material]:
-    """Every material of the library by its name."""
+    """Returns every material of the library by its name."""
     return {name: Material.model_validate(_values(table)) for name, table in _tables().items()}
 
 
@@ -41,7 +41,7 @@ def provenance(name: str) -> dict[str, tuple[str, str]]:
 
 @dataclass(frozen=True)
 class Constant:
-    """A number of the library as text, such as ``7850 kg/m^3``."""
+    """A constant of the library: its value as text, such as ``7850 kg/m^3``, its confidence and its source."""
 
     key: str
     value: str
@@ -49,7 +49,7 @@ class Constant:
     source: str
     """Key of a source of the library."""
     cited: str
-    """Text of the source."""
+    """Text of the source, as it is cited."""
 
 
 def constants(name: str) -> list[Constant]:
@@ -65,7 +65,7 @@ def constants(name: str) -> list[Constant]:
 
 
 def material(case: Case, name: str) -> Material:
-    """Returns the material ``name`` of the case; if the case has no such material, that of the library. Raises
+    """Returns the material ``name`` of the case; if the case does not define it, the material of the library. Raises
     CaseError with the nearest names if the material is unknown.
     """
     known = {**library(), **case.materials}
@@ -80,7 +80,7 @@ def _tables() -> dict[str, dict[str, Any]]:
 
 
 def _values(table: dict[str, Any]) -> dict[str, Any]:
-    """Returns a table of the library in which each list ``[value, confidence, source]`` is replaced by its value."""
+    """Returns a table of the library with values in place of the lists ``[value, confidence, source]``."""
     return {key: _value(entry) for key, entry in table.items()}
 
 
@@ -91,7 +91,7 @@ def _value(entry: Any) -> Any:
 
 
 def _entries(table: dict[str, Any], prefix: str) -> Iterator[tuple[str, list[Any]]]:
-    """Yields the dotted key, the value, the confidence and the source key of each constant in a table."""
+    """Yields each constant of a table: its dotted key, and the list of value, confidence and source key."""
     for key, entry in table.items():
         if isinstance(entry, dict):
             yield from _entries(entry, f"{prefix}{key}.")

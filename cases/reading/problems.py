@@ -1,4 +1,4 @@
-"""Errors of a case: one line for each error, with the key that the user wrote."""
+"""Errors of a case: one line per error, with the key as the user wrote it."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -18,15 +18,15 @@ Location = tuple[int | str, ...]
 
 _DISCRIMINATORS = ("kind", "shape", "model")
 _LONGEST = 80
-"""Largest number of characters of a value in a message: a line of a terminal (chosen value)."""
+"""Largest number of characters of a value in a message, about a line of a terminal (chosen value)."""
 _MOST = 100
-"""Largest number of problems that are reported at once, because a user corrects fewer errors at once (chosen value)."""
+"""Largest number of errors that are reported at once; a user corrects fewer at a time (chosen value)."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """An error of a case: the key as the user wrote it, its value as text (empty if the key has no value), and the
-    allowed values.
+    """An error of a case: the key as the user wrote it, the value as text (empty if the key has no value), and what is
+    wrong or allowed.
     """
 
     key: str
@@ -44,21 +44,21 @@ class ConoidError(Exception):
 
 
 class CaseError(ConoidError, ValueError):
-    """Error: a case is not valid. The field ``problems`` lists every error; the text has one line for each error."""
+    """Error: a case is not valid. Its attribute ``problems`` lists every error; its text has one line per error."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
-        """Creates the error with at most a hundred problems, in the given order."""
+        """Creates the exception with the first hundred of ``problems``."""
         self.problems: tuple[Problem, ...] = tuple(problems)[:_MOST]
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     def __reduce__(self) -> tuple[type["CaseError"], tuple[tuple[Problem, ...]]]:
-        """Returns the arguments of the error for pickle: the problems, not the text."""
+        """Returns the arguments with which pickle creates the exception again: the problems, not the text."""
         return CaseError, (self.problems,)
 
 
 def problem(location: Location, value: object, message: str) -> Problem:
-    """Returns the problem at ``location``; ``value`` is shown as written, but shortened; Ellipsis stands for no
-    value.
+    """Returns the problem of the key at ``location``. ``value``: the value as written, which is shortened; Ellipsis if
+    the key has no value.
     """
     return Problem(dotted(location), "" if value is ... else shown(value), message)
 
@@ -80,8 +80,9 @@ def shown(value: object) -> str:
 
 
 def from_pydantic(error: ValidationError, data: Mapping[str, Any]) -> list[Problem]:
-    """Returns the errors of pydantic in ``error`` with the keys of ``data``, in clearer words of this module where it
-    has them. At most a hundred errors are returned, because the search for names similar to a misspelt name takes time.
+    """Returns the errors that pydantic has found, with the keys of ``data``. The texts of pydantic are replaced by
+    clearer texts where this module has them. The result has at most a hundred errors, because searching names similar
+    to a misspelt name takes time.
     """
     details = error.errors(include_url=False, include_context=True)
     places = [detail["loc"] for detail in details]
@@ -90,8 +91,8 @@ def from_pydantic(error: ValidationError, data: Mapping[str, Any]) -> list[Probl
 
 
 def _follows_from_others(detail: ErrorDetails, places: Iterable[Location]) -> bool:
-    """Whether pydantic reports a list as too short only because entries of the list have errors. ``places``: locations
-    of all errors.
+    """Whether the error ``detail`` only follows from other errors: pydantic reports a list as too short if entries of
+    the list have errors. ``places``: locations of all errors.
     """
     own = detail["loc"]
     return detail["type"] == "too_short" and any(len(other) > len(own) and other[: len(own)] == own for other in places)
@@ -151,7 +152,9 @@ def _list_wanted(location: Location, lengths: set[int]) -> str:
 
 
 def _table_wanted(location: Location) -> str:
-    """Returns what a key can have: a table; also ``true``, ``false`` or ``"none"`` if the model allows these values."""
+    """Returns the words for the values that the key can have: a table, and also ``true``, ``false`` or ``"none"`` if
+    the model allows them.
+    """
     marks = {
         type(mark)
         for model in _models_at(location[:-1])
@@ -188,12 +191,12 @@ def _step(data: Any, item: int | str) -> Any:
 
 
 def _keys(location: Location) -> list[str]:
-    """Returns the keys of the model at a pydantic location."""
+    """Returns the keys of the model at a location of pydantic."""
     return sorted({key for model in _models_at(location) for key in model.model_fields})
 
 
 def _lengths(location: Location) -> set[int]:
-    """Returns the largest length of the list at a pydantic location; None if the length has no limit."""
+    """Returns the fixed lengths that the list at a location of pydantic may have; empty if no length is fixed."""
     fields = [
         model.model_fields[str(location[-1])]
         for model in _models_at(location[:-1])
@@ -204,7 +207,7 @@ def _lengths(location: Location) -> set[int]:
 
 
 def _tags(location: Location) -> list[str]:
-    """Returns the values that the discriminator of the union at a pydantic location can have."""
+    """Returns the values that select a variant of the table at a location of pydantic."""
     return [tag for model in _models_at(location) for tag in _tags_of(model)]
 
 
@@ -216,7 +219,7 @@ def _tags_of(model: type[BaseModel]) -> Iterator[str]:
 
 
 def _models_at(location: Location) -> list[type[BaseModel]]:
-    """Returns the models that are possible at a pydantic location; several models for a union that is not decided."""
+    """Returns the models that are possible at a location of pydantic: several if the data does not select a variant."""
     models: list[type[BaseModel]] = [Case]
     named = False
     for item in location:

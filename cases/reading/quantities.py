@@ -1,4 +1,4 @@
-"""The unit of every measured number of a run, and the reading of ``[[reference]]`` values."""
+"""The units of all measured quantities of a run, and the reading of the values of ``[[reference]]``."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -34,8 +34,8 @@ QUANTITY_UNITS: dict[str, str] = {
 
 
 def unit_of(quantity: str, field: str | None = None) -> str:
-    """Returns the unit of a reference quantity; ``field``: field of the probe of the reference. Raises KeyError if the
-    quantity or the field is unknown.
+    """Returns the unit of a reference quantity. ``field``: field of the probe that the reference names. Raises KeyError
+    if the quantity or the field is unknown.
     """
     return FIELD_UNITS[field or ""] if quantity.startswith("probe_") else QUANTITY_UNITS[quantity]
 
@@ -48,9 +48,9 @@ def unit_of_reference(data: Mapping[str, Any], location: Location) -> str:
 
 def read_references(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
     """Returns ``data`` with reference values and tolerances such as ``"21.47 mm"`` converted to SI units, and the
-    errors.
+    errors in them.
 
-    A value that cannot be read is replaced by 1.0, so that pydantic does not report the same error again.
+    A value that cannot be read becomes 1.0, so that pydantic does not report it a second time.
     """
     listed = data.get("reference")
     if not isinstance(listed, Sequence) or isinstance(listed, str):

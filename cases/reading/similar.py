@@ -1,16 +1,16 @@
-"""Names that are similar to a misspelt name, for the end of a message."""
+"""Names that are similar to a misspelt name, for the ends of messages."""
 
 import difflib
 from collections.abc import Iterable
 
 _LONGEST = 80
-"""Number of characters of a word that are compared; no allowed name has more characters (reason of the chosen
-value)."""
+"""Number of characters of a name that are compared; no allowed name is longer (reason of the chosen value)."""
 _CUTOFF, _MOST = 0.6, 3
-"""Smallest similarity of a suggested name (default of difflib), and number of suggestions (chosen value)."""
+"""Smallest similarity of a name that is suggested (the default of difflib), and largest number of suggestions (chosen
+value)."""
 _PART = 3
-"""Shortest prefix, in letters, for which a name is suggested; shorter prefixes occur in too many names (reason of the
-chosen value)."""
+"""Smallest number of letters of a misspelt name for which names that begin with it are suggested; too many names begin
+with fewer letters (reason of the chosen value)."""
 
 
 def close(word: str, known: Iterable[str]) -> list[str]:
@@ -27,8 +27,8 @@ def close(word: str, known: Iterable[str]) -> list[str]:
 
 
 def meant(word: object, known: Iterable[str]) -> str:
-    """Returns ``; did you mean 'mises'?`` for the end of a message that lists the allowed names; empty if no name is
-    similar.
+    """Returns the text ``; did you mean 'mises'?`` for the end of a message that lists the allowed names. The text is
+    empty if no name is similar.
     """
     found = close(word, known) if isinstance(word, str) else []
     return f"; {_asked(found)}" if found else ""

@@ -1,5 +1,6 @@
-"""Reading and writing of complete files: atomic replacement, and safe opening of files that another user may have
-placed."""
+"""Reading and writing of whole files: files are replaced atomically, and files that another user may have placed are
+opened safely.
+"""
 
 import errno
 import os
@@ -10,19 +11,19 @@ from io import BytesIO, FileIO, TextIOWrapper
 from pathlib import Path
 
 MOST = 256 << 20
-"""Largest size of a file that is read as a whole, bytes; a case, an outcome and a manifest have some MB at most (reason
-of the chosen limit)."""
+"""Largest size of a file that is read as a whole, bytes; a case, an outcome or a manifest has some MB at most (reason
+of the chosen value)."""
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0)
-"""Flags of open(2) with which opening a pipe without a writer does not block."""
+"""Flag of open(2) with which the call does not wait if a pipe has no writer."""
 _NO_FILE = frozenset({errno.ELOOP, errno.ENXIO, errno.ENODEV, errno.EOPNOTSUPP})
-"""Errors that open(2) reports for a link to itself, for a socket, and for a device without a driver."""
+"""Error numbers of open(2) for a symbolic link, for a socket, and for a device without a driver."""
 
 
 @contextmanager
 def named(path: str | Path) -> Iterator[None]:
-    """Adds ``path`` to an OSError of the ``with`` block that has no file name, because write(2) and fsync(2) do not set
-    the name.
+    """Adds the file name ``path`` to an OSError of the ``with`` block that has none: write(2) and fsync(2) do not set
+    it.
     """
     try:
         yield
@@ -33,8 +34,8 @@ def named(path: str | Path) -> Iterator[None]:
 
 
 def write(path: Path, content: bytes, mode: int = 0o644) -> None:
-    """Replaces a file atomically: writes a temporary file in the same folder, flushes it to disk, renames it; removes
-    an incomplete temporary file. Raises OSError, also if the temporary name is a link.
+    """Replaces a file atomically: writes a temporary file in the same folder, flushes it to disk and renames it. If
+    this fails, the temporary file is removed. Raises OSError, also if the temporary file would be a symbolic link.
     """
     beside = path.with_name(f"{path.name}.part")
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | _NO_LINK
@@ -51,8 +52,8 @@ def write(path: Path, content: bytes, mode: int = 0o644) -> None:
 
 
 def touch(path: Path) -> None:
-    """Creates an empty file if the file does not exist. Raises OSError, also for a link; the target of the link is not
-    changed.
+    """Creates an empty file if there is none at ``path``. Raises OSError, also if ``path`` is a symbolic link; its
+    target stays unchanged.
     """
     os.close(os.open(path, os.O_WRONLY | os.O_CREAT | _NO_LINK | _AT_ONCE, 0o666))
 
@@ -61,8 +62,8 @@ def opened(path: str | Path, *, folder: int | None = None, links: bool = True) -
     """Opens a regular file for reading, unbuffered.
 
     ``folder``: descriptor of the directory to which ``path`` is relative; ``links``: whether the file may be a symbolic
-    link. A pipe, a socket or a device could block the reader, or never end; each of them is refused like a directory,
-    with IsADirectoryError. Raises OSError.
+    link. Pipes, sockets and devices are refused with IsADirectoryError, because reading them could wait or never end.
+    Raises OSError.
     """
     try:
         handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | _AT_ONCE | (0 if links else _NO_LINK), dir_fd=folder)
@@ -90,7 +91,7 @@ def _regular(handle: int, path: str | Path, mode: str) -> FileIO:
 
 
 def read(path: str | Path, most: int = MOST, *, links: bool = True) -> bytes:
-    """Returns the bytes of a regular file of at most ``most`` bytes; ``links``: whether the file may be a symbolic
+    """Returns the bytes of a regular file of at most ``most`` bytes. ``links``: whether the file may be a symbolic
     link.
 
     Raises IsADirectoryError if the file is not regular; raises OSError.
@@ -112,7 +113,7 @@ def read_text(path: str | Path) -> str:
 
 
 def check(path: str | Path, most: int = MOST) -> None:
-    """Raises the errors that the function ``read`` would raise."""
+    """Raises the error that the function ``read`` would raise for this file, without reading it."""
     with opened(path) as file:
         _size(file, path, most)
 

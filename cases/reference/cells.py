@@ -1,4 +1,4 @@
-"""Table rows of keys in the reference of a case: value, default and meaning as text of a Markdown table."""
+"""Table rows of the reference of keys: value, default and meaning of each key as Markdown."""
 
 import json
 import re
@@ -13,15 +13,15 @@ BAR = r"\|"
 
 
 class Cells:
-    """Table rows of the keys of a schema. ``paths``: path of the table of each definition in the schema, by the id of
-    the definition.
+    """Converts the keys of a JSON schema to table rows. ``paths``: path of the table of each definition of the schema,
+    by the reference to the definition.
     """
 
     def __init__(self, whole: Schema, paths: Mapping[int, str]) -> None:
         self._whole, self._paths = whole, paths
 
     def row(self, key: str, schema: Schema, required: bool) -> str:
-        """Returns the table row of a key: ``| key | value | default | meaning |``."""
+        """Returns the row of a key: ``| key | value | default | meaning |``."""
         default = "required" if required else _default(schema)
         cells = (f"`{key}`", self._value(schema), default, " ".join(schema["description"].split()))
         return f"| {' | '.join(cell.replace('|', BAR) for cell in cells)} |"
@@ -41,7 +41,7 @@ class Cells:
         return self._several(meant) or _scalar(meant)
 
     def _several(self, schema: Schema) -> str:
-        """Returns the words for a list, or for tables by name; empty for a single value."""
+        """Returns the words for a list or for tables by name; empty for a single value."""
         if "prefixItems" in schema:
             return _fixed([self._value(each) for each in schema["prefixItems"]])
         if "items" in schema:
@@ -106,5 +106,5 @@ def _range(schema: Schema) -> str:
 
 
 def _bound(value: float) -> str:
-    """Returns a bound as a short number, because the exact number of a full turn has seventeen digits."""
+    """Returns a bound as a short number; the exact value of 2 pi has seventeen digits."""
     return f"{value:.6g}" if isinstance(value, float) and not value.is_integer() else f"{value}"

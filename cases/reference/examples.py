@@ -1,4 +1,4 @@
-"""Examples of the reference of keys: the smallest complete case, and pieces that can be added to this case."""
+"""Examples in the reference of keys: a smallest complete case, and changes of this case."""
 
 SMALLEST = """\
 name = "ball_on_plate"
@@ -29,7 +29,7 @@ element_size = "1 mm"
 [run]
 end_time = "50 us"
 """
-"""A case with no key that has a default, except the velocity and the positions of the bodies."""
+"""A complete case. Of the keys that have defaults it has only the velocity and the positions of the bodies."""
 
 EXAMPLES = {
     "`parts[].erosion`": """\
@@ -186,5 +186,5 @@ frames = 50
 max_wall_time = "8 h"
 """,
 }
-"""Pieces that change the smallest case, by the title of their section. A piece for a part that the smallest case
-already has sets further keys of this part."""
+"""Changes of the smallest case that show a table, by the title of the section of this table. If a change names a part
+that the smallest case has, its keys are added to this part."""

@@ -1,4 +1,6 @@
-"""A case with every default as a flat mapping, for example from ``parts[0].velocity[2]`` to -210.0, in SI units."""
+"""A case as a flat mapping from keys to values, including defaults, in SI units: for example from
+``parts[0].velocity[2]`` to -210.0.
+"""
 
 from collections.abc import Iterator
 from itertools import islice
@@ -11,8 +13,8 @@ _WITHOUT_EFFECT = frozenset({"name", "title", "description", "reference"})
 
 
 def flat(case: dict[str, Any], most: int, longest: int) -> dict[str, Scalar]:
-    """Returns the values of the keys of a case by key, at most ``most`` values; texts are cut to ``longest``
-    characters. Keys without an effect on the answer are left out: names, descriptions, references.
+    """Returns the flat mapping of a case, with at most ``most`` keys; texts are cut to ``longest`` characters. Keys
+    without effect on the answer are left out: names, descriptions, references.
     """
     entries = ((key, value) for key, value in case.items() if key not in _WITHOUT_EFFECT)
     pairs = (pair for key, value in entries for pair in _scalars(key, value))

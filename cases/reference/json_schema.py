@@ -12,23 +12,24 @@ from ..units import NUMBER
 Schema = dict[str, Any]
 
 _BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
-"""Names of bounds in pydantic, where a function reads the value first, and the names of the same bounds in JSON
-schema."""
+"""Names of bounds: those that pydantic uses for a key whose value a function reads first, and those of JSON schema."""
 LINE = "#:schema"
-"""Start of the line of a TOML file that names the schema for editors."""
+"""Beginning of the line of a TOML file that names the schema for editors."""
 FILE = "case.schema.json"
 """Name of the file with the schema, one folder above the shipped cases."""
 
 
 def json_schema(refs: str = "#/$defs/{model}") -> Schema:
-    """Returns the JSON schema of a case; ``refs``: location of the definitions in the schema."""
+    """Returns the JSON schema of a case. ``refs``: pattern of the references to its definitions."""
     made = _tidy(Case.model_json_schema(ref_template=refs))
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made, "title": "Conoid case"}
 
 
 @cache
 def shipped_schema() -> Schema:
-    """Returns the JSON schema of a case, read from ``FILE`` in 2 ms; making the schema from the models takes 60 ms."""
+    """Returns the JSON schema of a case from the file ``FILE``: reading it takes 2 ms; making it from the models takes
+    60 ms.
+    """
     schema: Schema = json.loads((Path(__file__).parents[1] / FILE).read_bytes())
     return schema
 
@@ -40,8 +41,8 @@ def schema_text() -> str:
 
 
 def _tidy(schema: Any, named: bool = False) -> Any:
-    """Returns a schema with the bounds of JSON schema, plain texts and no titles; ``named``: whether the keys of the
-    schema are keys of a case.
+    """Returns a schema in which bounds have the names of JSON schema, texts are plain, and titles are removed.
+    ``named``: whether the keys of the schema are keys of a case.
     """
     if isinstance(schema, list):
         return [_tidy(each) for each in schema]
@@ -67,13 +68,13 @@ def plain(text: str) -> str:
 
 
 def definition(schema: Schema, whole: Schema) -> Schema:
-    """Returns the definition in ``whole`` to which a schema refers, or the schema itself."""
+    """Returns the definition in ``whole`` to which ``schema`` refers; if it refers to none, returns ``schema``."""
     reference = schema.get("$ref")
     return whole["$defs"][reference.rpartition("/")[2]] if reference else schema
 
 
 def variants(schema: Schema) -> list[Schema]:
-    """Returns the alternatives that a value may match, without the alternative of an absent key."""
+    """Returns the alternatives of a value, without the alternative that the key is absent."""
     listed = schema.get("anyOf") or schema.get("oneOf") or [schema]
     return [each for one in listed for each in (variants(one) if one is not schema else [one]) if not _absent(each)]
 

@@ -12,8 +12,8 @@ _STEP = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
 
 @lru_cache(256)
 def unit_of_key(key: str) -> str:
-    """Returns the unit of a key, such as ``m/s`` for ``parts[0].velocity[2]``; empty if a number has no unit, or if
-    another key determines the unit.
+    """Returns the unit of a number at a key, such as ``m/s`` for ``parts[0].velocity[2]``. The unit is empty if the
+    number has none, or if another key determines the unit.
     """
     whole = _schema()
     found = [definition(whole, whole)]

@@ -1,4 +1,4 @@
-"""The reference of the keys of a case (docs/reference/case.md), made from the JSON schema: one section per table."""
+"""The page docs/reference/case.md with all keys of a case, made from the JSON schema; it has one section per table."""
 
 import re
 import textwrap
@@ -52,15 +52,16 @@ _CHAPTERS = {
     "Numerical method": ("numerics",),
     "Run": ("run", "balance"),
 }
-"""Chapters of the page, and the beginnings of the table paths that belong to each chapter; the longest matching
-beginning decides."""
+"""Chapters of the page, each with the beginnings of the paths of its tables. If several beginnings match a table, the
+longest decides."""
 
 _SEVERAL = 4
-"""Number of variants of a table from which on a common key is listed before the variants (chosen value)."""
+"""Number of variants of a table from which on keys that only some variants have in common are listed before the
+variants (chosen value)."""
 
 
 def page() -> str:
-    """Returns the whole reference page."""
+    """Returns the page as Markdown."""
     text = "\n".join([_head(), *_Page(json_schema()).chapters()])
     return re.sub(r"docs/([a-z]+/[a-z_]+\.md)", r"[\1](../\1)", text)
 
@@ -82,7 +83,7 @@ def _below(path: str, start: str) -> bool:
 
 
 class _Page:
-    """The chapters of the page of one schema."""
+    """The page of one schema, as chapters."""
 
     def __init__(self, whole: Schema) -> None:
         self._tables = tables(whole)
@@ -107,8 +108,8 @@ class _Page:
         yield _grid(self._rows(table).values())
 
     def _variants(self, group: list[Table]) -> Iterator[str]:
-        """Yields the sections of a table with variants: first the common keys, then each variant with its remaining
-        keys.
+        """Yields the sections of a table with variants: first the keys that variants have in common, then each variant
+        with its other keys.
         """
         key = group[0].key
         yield f"### `{group[0].path}`\n"
@@ -127,7 +128,9 @@ class _Page:
             yield "\n".join([f"| {key} | keys of its own | described at |", "|---|---|---|", *known, ""])
 
     def _shared(self, group: list[Table], common: list[str]) -> str:
-        """Returns the table of common keys, with a column of the variants that have each key."""
+        """Returns the table of the keys that variants have in common; a column gives the variants that have each
+        key.
+        """
         lines = []
         for line in common:
             values = [each.value for each in group if line in self._own(each).values()]
@@ -142,8 +145,8 @@ class _Page:
             yield _grid(own.values())
 
     def _same(self, table: Table, own: dict[str, str]) -> Table | None:
-        """Returns the table with the same shape, kind or model and a shorter path, if that table has all of these
-        rows.
+        """Returns a table with a shorter path and the same shape, kind or model if it has all rows of ``own``; None if
+        there is none.
         """
         for each in self._tables:
             same = (each.key, each.value) == (table.key, table.value) and len(each.path) < len(table.path)
@@ -152,7 +155,7 @@ class _Page:
         return None
 
     def _own(self, table: Table) -> dict[str, str]:
-        """Returns the rows of a variant, without the row of the key that selects the variant."""
+        """Returns the rows of a variant without the row of the key that selects it."""
         return {name: line for name, line in self._rows(table).items() if name != table.key}
 
     def _rows(self, table: Table) -> dict[str, str]:
@@ -162,13 +165,15 @@ class _Page:
 
 
 def _common(variants: list[dict[str, str]]) -> list[str]:
-    """Returns the table rows that all variants have in common, or that several variants have in common."""
+    """Returns the table rows that at least four of the variants have in common; for fewer than four variants, the rows
+    that all have in common.
+    """
     lines = [line for rows in variants for line in rows.values()]
     return [line for line in dict.fromkeys(lines) if lines.count(line) >= max(2, min(_SEVERAL, len(variants)))]
 
 
 def _which(values: list[str], every: list[str]) -> str:
-    """Returns the names of variants in few words."""
+    """Returns the names of the variants ``values`` as text: ``all``, ``all except ...``, or a list."""
     others = [value for value in every if value not in values]
     if not others:
         return "all"
@@ -183,6 +188,6 @@ def _text(table: Table) -> Iterator[str]:
 
 
 def _grid(rows: Iterable[str], last: str = "") -> str:
-    """Returns a Markdown table of keys; ``last``: title of the fifth column."""
+    """Returns a Markdown table of keys. ``last``: title of a fifth column."""
     titles = ["key", "value", "default", "meaning", *([last] if last else [])]
     return "\n".join([f"| {' | '.join(titles)} |", f"|{'---|' * len(titles)}", *rows, ""])

@@ -1,4 +1,4 @@
-"""The tables of a case in its JSON schema: path, variant and schema of each table."""
+"""The tables of a case, found in its JSON schema: the path, the variant and the schema of each table."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ _TAGS = ("shape", "kind", "model")
 
 @dataclass(frozen=True)
 class Table:
-    """A table of the case: path, such as ``parts[].mesh``, and schema. A variant also has the key that selects it
-    (``shape``) and the value of this key (``box``).
+    """A table of a case: its path, such as ``parts[].mesh``, and its schema. A variant of a table also has the key that
+    selects it, such as ``shape``, and the value of this key, such as ``box``.
     """
 
     path: str
@@ -28,14 +28,18 @@ class Table:
 
 
 def tables(whole: Schema) -> list[Table]:
-    """Returns every table of a case in the order of the keys; a table with several paths has the shortest path."""
+    """Returns every table of a case in the order of the keys. A table that has several paths is listed with the
+    shortest path.
+    """
     found: dict[int, Table] = {}
     _collect(found, Table("", whole), whole)
     return list(found.values())
 
 
 def _collect(found: dict[int, Table], table: Table, whole: Schema) -> None:
-    """Adds a table and the tables below it; the operands of a combination can be combinations again."""
+    """Adds a table and the tables in it to ``found``. A table is added only once, because operands of a combination can
+    be combinations again.
+    """
     if (known := found.get(id(table.schema))) is not None:
         found[id(table.schema)] = min(known, table, key=lambda each: len(each.path))
         return
@@ -58,6 +62,6 @@ def _tables_in(path: str, schema: Schema, whole: Schema) -> Iterator[tuple[str, 
 
 
 def _tag(schema: Schema) -> tuple[str, str]:
-    """Returns the key that selects this variant, and the value of the key; empty for a table without variants."""
+    """Returns the key that selects the variant, and its value; empty texts for a table without variants."""
     values = ((key, schema["properties"].get(key, {}).get("const")) for key in _TAGS)
     return next(((key, value) for key, value in values if value is not None), ("", ""))

@@ -1,7 +1,7 @@
-"""Combinations of shapes before they are meshed: points inside, bounding box, approximate size.
+"""Combinations of shapes before they are meshed: test of points, bounding box, approximate size of the mesh.
 
-Points are tested exactly; volumes are computed from the points of a lattice. The size of a solid of a CAD file is
-unknown until the file is read.
+Whether a point lies inside is tested exactly; volumes are computed from the points of a lattice that lie inside. A
+solid of a CAD file has no size before the file is read.
 """
 
 import math
@@ -29,13 +29,14 @@ Bounds = tuple[Vector, Vector]
 Inside = Callable[[Vector], bool]
 
 WORST = 0.45
-"""Step length of the worst tet of gmsh divided by that of a regular tet, for a combination without edges shorter than
-an element. The ratio is 0.3 to 0.7 in 40 of the combinations of tests/mesh/test_combinations.py."""
+"""Step length of the worst tet in a mesh of gmsh, divided by the step length of a regular tet, for a combination
+without edges shorter than an element. Measured: 0.3 to 0.7 for 40 of the combinations of
+tests/mesh/test_combinations.py."""
 _LATTICE = 12
-"""Number of sampling points per direction of a combination: 1,728 points, and volumes within some per cent (chosen
-value)."""
+"""Number of sampling points per direction of a combination (chosen value): 1,728 points in all, which give the volume
+within some per cent."""
 _BULKY = 1.5
-"""Surface of a combination divided by the surface of a cube of the same volume (chosen value)."""
+"""Assumed surface of a combination, divided by the surface of a cube of the same volume (chosen value)."""
 _BODIES: dict[str, type[Model]] = {
     "box": Box, "plate": Plate, "cylinder": Cylinder, "tube": Tube, "sphere": Sphere, "cone": Cone, "ogive": Ogive,
     "hemisphere": Hemisphere, "spherical_cap": SphericalCap, "ring_sector": RingSector,
@@ -43,8 +44,8 @@ _BODIES: dict[str, type[Model]] = {
 
 
 def box_of(form: CombinedForm | Operand) -> Bounds | None:
-    """Returns the corners of the bounding box of a shape, m; None for a file. The bounding box of an operand is that
-    before the rotation of the operand; the low corner of an empty intersection can be above the high corner.
+    """Returns the low and the high corner of the bounding box of a shape, m; None for a file. The box of an operand is
+    that before its rotation. For an empty intersection the low corner can be above the high corner.
     """
     if isinstance(form, FileForm):
         return None
@@ -67,8 +68,8 @@ def box_of(form: CombinedForm | Operand) -> Bounds | None:
 
 
 def _unturned(form: Operand) -> bool:
-    """Whether the bounding box of an operand contains the operand at its position: a combination inside the operand is
-    turned as a whole.
+    """Whether the bounding box of an operand contains the operand at its position. This is so if no operand in it is
+    turned.
     """
     return not isinstance(form, CombinedForm) or form.turn is None
 
@@ -79,8 +80,8 @@ def _placed(form: Operand) -> Placed:
 
 
 def inside(form: CombinedForm | Operand) -> Inside | None:
-    """Returns the test whether a point, m, lies in a shape; the test is built once for many points. The result is None
-    for a file.
+    """Returns a function that tests whether a point, m, lies in the shape. Make it once for many points. For a file the
+    result is None.
     """
     if isinstance(form, FileForm):
         return None
@@ -108,7 +109,7 @@ def _joined(form: CombinedForm, known: list[Inside]) -> Inside:
 
 
 def modelled(mesh: Combination) -> Bounds | None:
-    """Returns the bounding box of the modelled part of a combination, m, as far as ``box_of`` gives a box."""
+    """Returns the bounding box of the modelled part of a combination, m; None where ``box_of`` returns None."""
     box = box_of(mesh)
     if box is None:
         return None
@@ -119,7 +120,7 @@ def modelled(mesh: Combination) -> Bounds | None:
 
 
 def cut_by(sector: str, axis: Axis) -> tuple[int, ...]:
-    """Returns the directions across ``axis`` in which a sector keeps only the positive side."""
+    """Returns the directions across ``axis`` in which a sector has only the positive side."""
     return across(axis)[: {"full": 0, "half": 1, "quarter": 2}[sector]]
 
 
@@ -144,8 +145,8 @@ def combined_size(mesh: Combination) -> MeshSize | None:
 
 
 def _sizes(mesh: Combination, held: list[Vector], volume: float) -> list[float]:
-    """Returns the element sizes, m, of equal fractions of the volume, m^3; ``held``: points of a lattice inside of the
-    shape, m.
+    """Returns the element sizes, m, at equal fractions of the volume, m^3. ``held``: points of a lattice that lie
+    inside the shape, m.
     """
     grading = mesh.grading
     if grading is None:
@@ -157,5 +158,5 @@ def _sizes(mesh: Combination, held: list[Vector], volume: float) -> list[float]:
 
 
 def _skin(volume: float) -> float:
-    """Returns the approximate surface, m^2, of a combination with a given volume, m^3."""
+    """Returns the approximate surface, m^2, of a combination with the given volume, m^3."""
     return float(_BULKY * 6.0 * volume ** (2.0 / 3.0))

@@ -1,4 +1,4 @@
-"""Dimensions of the mesh primitives by formula: bounds, volume, smallest extent, extent along a direction."""
+"""Dimensions of the mesh primitives by formulas: bounds, volume, surface, smallest extent, extent along a direction."""
 
 import math
 from collections.abc import Callable
@@ -16,7 +16,7 @@ AXES: tuple[Axis, Axis, Axis] = ("x", "y", "z")
 
 
 def index(axis: Axis) -> int:
-    """Index of each axis: 0 for x, 1 for y, 2 for z."""
+    """Returns the index of an axis: 0 for x, 1 for y, 2 for z."""
     return AXES.index(axis)
 
 
@@ -26,13 +26,13 @@ def across(axis: Axis) -> tuple[int, int]:
 
 
 def cut_directions(mesh: Primitive, axis: Axis) -> tuple[int, ...]:
-    """The directions across ``axis`` in which only the positive side is modelled."""
+    """Returns the directions across ``axis`` in which only the positive side of the body is modelled."""
     return across(axis)[: {"full": 0, "half": 1, "quarter": 2}[mesh.sector]]
 
 
 def centre(mesh: Generated) -> Vector:
-    """Returns the point through which a sector is cut: the origin for a box, the centre or the base for other
-    bodies.
+    """Returns the point through which a sector cuts a body: the origin of the coordinates for a box, the centre or the
+    base for other bodies.
     """
     if isinstance(mesh, Box):
         return (0.0, 0.0, 0.0)
@@ -40,7 +40,7 @@ def centre(mesh: Generated) -> Vector:
 
 
 def whole_bounds(mesh: Generated) -> tuple[Vector, Vector]:
-    """Lowest and highest coordinates of the whole body, m, for any sector."""
+    """Lowest and highest coordinates of the whole body, m, also if only a sector is modelled."""
     if isinstance(mesh, Box):
         return mesh.low, mesh.high
     if isinstance(mesh, Sphere):
@@ -65,7 +65,7 @@ def height(mesh: Plate | Cylinder | Tube | Revolved | RingSector) -> float:
 
 
 def _reach(mesh: Plate | Cylinder | Tube | Revolved | RingSector) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Extent of the whole body from its base in the two directions across the body's axis, m."""
+    """Extent of the whole body from its base in the two directions across its axis: lowest and highest values, m."""
     if isinstance(mesh, RingSector):
         return ring.extremes(mesh, whole=True)
     if isinstance(mesh, Plate):
@@ -75,8 +75,8 @@ def _reach(mesh: Plate | Cylinder | Tube | Revolved | RingSector) -> tuple[tuple
 
 
 def _two_tets(mesh: TwoTets, i: int, j: int) -> tuple[Vector, Vector]:
-    """Returns the lowest and highest coordinates of two tets, m. The common face of the two tets has a corner in the
-    direction ``i``, and an edge normal to this direction.
+    """Returns the lowest and highest coordinates of the shape ``two_tets``, m. The common face of the two tets has a
+    corner in the direction ``i`` and an edge normal to this direction.
     """
     edge, low, high = mesh.element_size, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
     off = altitude(mesh) * math.tan(mesh.lean)
@@ -93,8 +93,8 @@ def altitude(mesh: TwoTets) -> float:
 
 
 def side_areas(mesh: TwoTets) -> tuple[float, ...]:
-    """Areas of the six exposed faces of two tets, m^2. The outward normals of the edges of the common face are at 60,
-    180 and 300 deg.
+    """Areas of the six exposed faces of the shape ``two_tets``, m^2. The outward normals of the edges of the common
+    face are at 60, 180 and 300 deg.
     """
     edge, off = mesh.element_size, altitude(mesh) * math.tan(mesh.lean)
     feet = [edge / math.sqrt(12.0) + sign * off * share for sign in (-1.0, 1.0) for share in (0.5, -1.0, 0.5)]
@@ -102,17 +102,21 @@ def side_areas(mesh: TwoTets) -> tuple[float, ...]:
 
 
 def pitch(mesh: Shards) -> float:
-    """Edge of the cube of a separate tet, m: the sphere around the tet, the displacement of its nodes, and the gap."""
+    """Edge length of the cube that contains one separate tet, m: the diameter of the sphere around the tet, plus twice
+    the displacement of its nodes, plus the gap.
+    """
     return 2.0 * mesh.element_size * (math.sqrt(3.0 / 8.0) + math.sqrt(3.0) * mesh.perturbation) + mesh.gap
 
 
 def tets(mesh: TwoTets | Shards) -> int:
-    """Number of tets of a body that consists of given tets."""
+    """Number of tets of the shapes that consist of single tets."""
     return 2 if isinstance(mesh, TwoTets) else math.prod(mesh.count)
 
 
 def bounds(mesh: Mesh) -> tuple[Vector, Vector] | None:
-    """Lowest and highest coordinates of the modelled part of a body, m; None for bodies with measured sizes."""
+    """Lowest and highest coordinates of the modelled part of a body, m; None for bodies whose sizes are measured on
+    their mesh.
+    """
     if isinstance(mesh, Measured):
         return None
     low, high = map(list, whole_bounds(mesh))
@@ -125,7 +129,7 @@ def bounds(mesh: Mesh) -> tuple[Vector, Vector] | None:
 
 
 def volume(mesh: Generated) -> float:
-    """Volume of the modelled part of a body, m^3; the volume of separate tets is that before their nodes are moved."""
+    """Volume of the modelled part of a body, m^3; for separate tets, before their nodes are moved at random."""
     if isinstance(mesh, Box):
         low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
         return math.prod(max(0.0, b - a) for a, b in zip(low, high, strict=True))
@@ -145,7 +149,7 @@ def volume(mesh: Generated) -> float:
 
 
 def surface(mesh: Generated) -> float:
-    """Surface of the modelled part of a body, m^2, with the cut faces of a sector and both sides of a slit."""
+    """Surface of the modelled part of a body, m^2, including the cut faces of a sector and both sides of a slit."""
     if isinstance(mesh, Box | Plate):
         low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
         a, b, c = (y - x for x, y in zip(low, high, strict=True))
@@ -176,7 +180,9 @@ def _ring_surface(mesh: RingSector) -> float:
 
 
 def slit_extents(mesh: Box | Plate) -> tuple[float, float]:
-    """Extent of the slit inside of its body along the two directions across the slit's axis, m; 0 without a slit."""
+    """Extents of the part of a slit that lies inside the body, in the two directions across the axis of the slit, m; 0
+    without a slit.
+    """
     if mesh.slit is None:
         return 0.0, 0.0
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
@@ -188,9 +194,7 @@ def slit_extents(mesh: Box | Plate) -> tuple[float, float]:
 
 
 def holds(mesh: Generated, point: Vector) -> bool:
-    """Whether ``point`` lies inside the modelled part of a body; for a body of given tets, inside the bounds of the
-    body.
-    """
+    """Whether ``point``, m, lies inside the modelled part of a body; for single tets, inside the bounds of the body."""
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
     if not all(a <= x <= b for a, x, b in zip(low, point, high, strict=True)):
         return False
@@ -198,7 +202,7 @@ def holds(mesh: Generated, point: Vector) -> bool:
 
 
 def round_part(mesh: Generated) -> Callable[[Vector], bool]:
-    """Returns the test whether a point inside the bounds of a body lies inside the body; the test is built once for
+    """Returns a function that tests whether a point inside the bounds of a body lies inside the body. Make it once for
     many points.
     """
     if isinstance(mesh, Box | Plate | TwoTets | Shards):
@@ -221,8 +225,9 @@ def _in_ring(mesh: RingSector, x: float, y: float) -> bool:
 
 
 def thinnest(mesh: Generated) -> float:
-    """The smallest extent of the body, m: wall of a tube, diameter of a sphere, larger end of a cone, outer arc of a
-    ring sector."""
+    """Smallest extent of the body, m: for example the wall thickness of a tube, the diameter of a sphere, the diameter
+    of the larger end of a cone, the outer arc of a ring sector.
+    """
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
     extents = [b - a for a, b in zip(low, high, strict=True)]
     if isinstance(mesh, RingSector):
@@ -233,8 +238,8 @@ def thinnest(mesh: Generated) -> float:
 
 
 def lowest_along(mesh: Generated, normal: Vector) -> float:
-    """The smallest value of ``normal . x`` over the whole body, m, for a unit normal. For a ring sector and for a body
-    of given tets, the smallest value is that of the bounds of the body.
+    """Smallest value of ``normal . x`` over all points x of the whole body, m, for a unit vector ``normal``. For a ring
+    sector and for single tets it is the smallest value over their bounds.
     """
     if isinstance(mesh, Box | RingSector | TwoTets | Shards):
         return sum(min(n * a, n * b) for n, a, b in zip(normal, *whole_bounds(mesh), strict=True))

@@ -1,4 +1,6 @@
-"""Element sizes of a graded mesh: by the distance from a point, line or plane, and by the depth below the surface."""
+"""Element sizes of a graded mesh, as a function of the distance from a point, line or plane, or of the depth below the
+surface.
+"""
 
 import math
 from collections.abc import Callable
@@ -7,13 +9,13 @@ from ..model.grading import Grading
 from .geometry import Vector, index
 
 _DEPTHS = 64
-"""Number of depths below the surface that are used for mean element sizes (chosen value). The means of 64 and of 1,000
-depths differ by less than 1 %."""
+"""Number of depths below the surface that are used for a mean of element sizes (chosen value). Means of 64 depths and
+of 1,000 depths differ by less than 1 %."""
 
 
 def size_at(size: float, grading: Grading) -> Callable[[Vector], float]:
-    """Returns the function of the element size, m, at a point, for a grading that is not by the surface of the body;
-    the function is built once for many points. ``size``: the element size near the point, line or plane, m.
+    """Returns a function that returns the element size, m, at a point, for a grading by the distance from a point, line
+    or plane. Make it once for many points. ``size``: the element size at small distances, m.
     """
     origin, radius = grading.origin, grading.radius
     if grading.normal is not None:
@@ -27,9 +29,9 @@ def size_at(size: float, grading: Grading) -> Callable[[Vector], float]:
 
 
 def sizes_by_depth(size: float, grading: Grading, volume: float, surface: float) -> list[float]:
-    """Returns the element sizes, m, of equal fractions of the volume of a body, from the surface inwards.
+    """Returns the element sizes, m, at equal fractions of the volume of a body, from the surface inwards.
 
-    The fraction of the volume below the depth d is (1 - d / r)^3 with r = 3 volume / surface, which is exact for a
+    The fraction of the volume that is deeper than d is (1 - d / r)^3 with r = 3 volume / surface. This is exact for a
     sphere and for a cube.
     """
     r = 3.0 * volume / surface

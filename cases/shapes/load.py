@@ -1,34 +1,35 @@
-"""The approximate load of a boundary, estimated before there is a mesh."""
+"""Estimate of the faces or nodes on which a boundary acts, before there is a mesh."""
 
 from dataclasses import dataclass
 
 _FACTOR, _NODES = 3.0, 10
-"""Largest ratio of an estimated number of nodes to the real number, and additional nodes (chosen values). A layer of an
-unstructured mesh has a third to three times as many nodes as its volume suggests."""
+"""Largest ratio of an estimated number of nodes to the real number, and a number of nodes that is added to this limit
+(chosen values). A layer of an unstructured mesh has a third to three times as many nodes as its volume suggests."""
 
 
 @dataclass(frozen=True)
 class Load:
-    """The approximate load of a boundary: faces of a traction, or nodes of a prescribed velocity. A field is None for a
-    mesh file, for single tets, and for the other kind of boundary.
+    """The estimate for one boundary: the faces on which a traction acts, or the nodes with a prescribed velocity. A
+    field is None if the boundary is of the other kind, and for mesh files and single tets.
     """
 
     boundary: int
-    """Index of the boundary."""
+    """Index of the boundary in the case."""
     area: float | None = None
-    """Loaded area, m^2."""
+    """Area of the loaded faces, m^2."""
     faces: int | None = None
     spread: float = 0.0
-    """Uncertainty of the estimated area of the mesh faces, m^2."""
+    """Largest expected difference of the area of the mesh faces from ``area``, m^2."""
     nodes: int | None = None
     fewest: int = 0
-    """Number of nodes in a box that is not widened by half an element on all sides."""
+    """Smallest expected number of nodes: those in the box of the boundary; ``nodes`` counts those in the box widened by
+    half an element on all sides."""
     exact: bool = False
-    """Whether nodes, or faces of a mesh file, are counted and not estimated."""
+    """Whether the nodes, or the faces of a mesh file, were counted and not estimated."""
 
     def agrees(self, nodes: int, faces: int, area: float) -> bool:
-        """Whether a mesh has approximately this load: number of driven ``nodes``, or ``faces`` with an ``area``,
-        m^2.
+        """Whether a mesh agrees with the estimate. ``nodes``: number of its driven nodes; ``faces``: number of its
+        loaded faces; ``area``: their area, m^2.
         """
         if self.area is not None and faces:
             return abs(area - self.area) <= self.spread
@@ -39,7 +40,7 @@ class Load:
         return self.fewest <= _FACTOR * nodes + _NODES and nodes <= _FACTOR * self.nodes + _NODES
 
     def words(self) -> str:
-        """Returns the load in words: ``about 32 faces, 4 mm^2``."""
+        """Returns the estimate as text: ``about 32 faces, 4 mm^2``."""
         if self.area is not None:
             return f"{'' if self.exact else 'about '}{self.faces} faces, {1e6 * self.area:.6g} mm^2"
         if self.nodes is not None:

@@ -1,5 +1,5 @@
-"""Estimates of the faces on which tractions act, and of the nodes in a box, from the shapes of bodies before there is a
-mesh.
+"""Estimates, from the shapes of bodies before there is a mesh, of the faces on which tractions act and of the nodes in
+a box.
 """
 
 import itertools
@@ -19,26 +19,26 @@ from .region import Region, slack
 from .sheets import sheets
 
 _FINEST = 60
-"""Largest number of patches along a side of a surface: a tenth of a second for a body (chosen value)."""
+"""Largest number of patches along a side of a surface; a body then takes a tenth of a second (chosen value)."""
 _MOST = 20
-"""Largest number of bodies per boundary: two seconds at most (chosen value)."""
+"""Largest number of bodies of one boundary; they take two seconds at most (chosen value)."""
 _POINTS = 100_000
-"""Largest number of nodes of a turned grid: half a second (chosen value)."""
+"""Largest number of nodes of a turned grid that are tested; they take half a second (chosen value)."""
 _LATTICE = 20
-"""Number of sampling points per direction for a body in a box: 8,000 points in all (chosen value)."""
+"""Number of sampling points per direction for a body that is partly in a box: 8,000 points in all (chosen value)."""
 _FACETS, _CURVED, _FLAT = 0.3, 0.02, 1e-6
-"""Relative errors of an area: facets may have less area than the surface, and patches may have less or more area. For
-curved faces the error is the first value times the square of the ratio of element size and radius, plus the second
-value. A chord 1.3 times as long as an element, and the end of a cylinder, give a sixth of the squared ratio. For flat
-faces the error is the third value; all values are chosen except the sixth (geometry)."""
+"""Relative errors of an estimated area: the facets of a mesh have less area than a curved surface, and patches may have
+less or more area. Curved faces: the first value times the square of the ratio of element size to radius, plus the
+second value. Flat faces: the third value. The geometry of a chord 1.3 times as long as an element, and of the end face
+of a cylinder, gives a sixth of the squared ratio; all three values are chosen."""
 _CORNERS = 4.0
-"""Area of faces, divided by the square of the element size, that a region may contain although it contains no patch;
-for curved and unstructured meshes (chosen value)."""
+"""Area of mesh faces that a region may contain although it contains no patch, divided by the square of the element
+size, for curved and unstructured meshes (chosen value)."""
 
 
 def loads(case: Case, counted: Sequence[Load] = ()) -> list[Load]:
-    """Returns the load of each traction and each prescribed velocity of a case; ``counted``: loads in meshes that have
-    been read.
+    """Returns the estimate of each traction and each prescribed velocity of a case. ``counted``: the results for meshes
+    that have been read.
     """
     known = {load.boundary: load for load in counted}
     return [known.get(load.boundary, load) for load in _loads(case)]
@@ -51,8 +51,8 @@ def _loads(case: Case) -> list[Load]:
 
 
 def parts_of(case: Case, spec: Traction | Prescribed) -> list[Part]:
-    """Returns the parts of a boundary; a boundary with a set and without names applies to all parts with a mesh from a
-    file.
+    """Returns the parts on which a boundary acts. A boundary that selects a set and names no part acts on all parts
+    with a mesh file.
     """
     if spec.on is not None and not spec.parts:
         return [part for part in case.parts if isinstance(part.mesh, MeshFile)]
@@ -60,13 +60,13 @@ def parts_of(case: Case, spec: Traction | Prescribed) -> list[Part]:
 
 
 def near(body: Placed) -> float:
-    """Tolerance at the border of a region for nodes of a body, m; see ``region.slack``."""
+    """Tolerance at the border of a region for the nodes of a body, m; see ``region.slack``."""
     reach = max(abs(x) for corner in body.bounds() for x in corner)
     return slack(body.mesh, body.mesh.element_size, reach)
 
 
 def _meets(region: Region, body: Placed) -> bool:
-    """Whether a body overlaps the box of a region."""
+    """Whether the bounds of a body overlap the box of a region."""
     margin = near(body)
     return all(
         a <= top + margin and b >= bottom - margin
@@ -78,8 +78,8 @@ def _meets(region: Region, body: Placed) -> bool:
 
 
 def _reached(case: Case, spec: Traction | Prescribed) -> list[tuple[str, Placed]] | None:
-    """Returns the names and bodies of the parts of a boundary that reach into the box of the boundary; None with a mesh
-    file, single tets or too many bodies.
+    """Returns the names and bodies of the parts of a boundary that overlap its box. The result is None if there are
+    mesh files, single tets or too many bodies.
     """
     region, found = Region.of(spec), list[tuple[str, Placed]]()
     for part in parts_of(case, spec):
@@ -105,8 +105,8 @@ def _acted_on(case: Case, number: int, spec: Traction) -> Load:
 
 
 def _free_faces(case: Case, name: str, body: Placed, region: Region) -> tuple[float, float, float]:
-    """Returns the result of ``_faces`` without the faces on the planes of symmetry of the part ``name``, because these
-    faces are cuts and no surface.
+    """Returns the result of ``_faces`` without the faces of part ``name`` on planes of symmetry: these faces are cuts
+    and not surface.
     """
     area, faces, spread = _faces(body, region)
     for _, plane in case.boundaries_of(Symmetry):
@@ -118,7 +118,9 @@ def _free_faces(case: Case, name: str, body: Placed, region: Region) -> tuple[fl
 
 
 def _faces(body: Placed, region: Region) -> tuple[float, float, float]:
-    """Returns the area, m^2, and the number of faces of a body in a region, and the uncertainty of the area."""
+    """Returns the area, m^2, and the number of the surface faces of a body in a region, and the error of the area,
+    m^2.
+    """
     mesh = body.mesh
     if region.everything:
         return surface(mesh), surface_faces(mesh), _facets(mesh) * surface(mesh)
@@ -127,7 +129,7 @@ def _faces(body: Placed, region: Region) -> tuple[float, float, float]:
 
 
 def planes_of(body: Placed, region: Region) -> list[int] | None:
-    """Returns the numbers of planes of nodes across x, y and z of a block of cubes in a box, for blocks that are
+    """Returns the numbers of planes of nodes normal to x, y and z that lie in a box, for a block of cubes that is
     neither turned nor slit; None for other bodies and regions.
     """
     mesh, margin = body.mesh, near(body)
@@ -144,8 +146,8 @@ def planes_of(body: Placed, region: Region) -> list[int] | None:
 
 
 def block_faces(body: Placed, region: Region) -> tuple[float, int] | None:
-    """Returns the area, m^2, and the number of faces of a block of cubes in a box; None for other bodies and regions,
-    and if the box contains no face.
+    """Returns the area, m^2, and the number of the surface faces of a block of cubes in a box. The result is None for
+    other bodies and regions, and if the box contains no face.
     """
     planes, mesh, margin = planes_of(body, region), body.mesh, near(body)
     if planes is None or not isinstance(mesh, Box | Plate) or region.low is None or region.high is None:
@@ -163,8 +165,9 @@ def block_faces(body: Placed, region: Region) -> tuple[float, int] | None:
 
 
 def _inside(body: Placed, region: Region) -> tuple[float, float, float]:
-    """Returns the area, m^2, and the number of faces of a body with all corners in a region, from patches of the
-    element size. Also returns the uncertainty of the area from patches on the border of the region and from facets.
+    """Returns the area, m^2, and the number of the surface faces that have all corners in a region, from patches as
+    large as elements. Also returns the error of the area, m^2, that patches on the border of the region and facets
+    cause.
     """
     mesh, margin = body.mesh, near(body)
     area, rim = 0.0, 0.0
@@ -185,12 +188,12 @@ def _inside(body: Placed, region: Region) -> tuple[float, float, float]:
 
 
 def _on_rim(corners: list[list[int]], i: int, j: int) -> bool:
-    """Whether a patch of a sheet has a neighbouring patch that is not completely inside of the region."""
+    """Whether a patch of a surface has a neighbouring patch that is not completely inside the region."""
     return any(count < 4 for row in corners[max(i - 1, 0) : i + 2] for count in row[max(j - 1, 0) : j + 2])
 
 
 def _regular(mesh: Generated) -> bool:
-    """Whether the mesh has two triangular faces in each patch of a surface."""
+    """Whether the mesh has two triangular faces in each patch of its surface."""
     return isinstance(mesh, Box | Plate) and mesh.generator == "structured"
 
 
@@ -204,7 +207,7 @@ def _facets(mesh: Generated) -> float:
 
 
 def _quad(a: Vector, b: Vector, c: Vector, d: Vector) -> float:
-    """The area of a flat quadrilateral, m^2, from its diagonals."""
+    """Area of a flat quadrilateral, m^2, from its diagonals."""
     (p, q, r), (s, t, u) = ([y - x for x, y in zip(*pair, strict=True)] for pair in ((a, c), (b, d)))
     return 0.5 * math.hypot(q * u - r * t, r * s - p * u, p * t - q * s)
 
@@ -222,8 +225,8 @@ def _held(case: Case, number: int, spec: Prescribed) -> Load:
 
 
 def _nodes(body: Placed, region: Region) -> tuple[int, int, bool]:
-    """Returns the smallest and the largest number of nodes of a body in a region, and whether these numbers are
-    exact.
+    """Returns the smallest and the largest possible number of nodes of a body in a region, and whether these numbers
+    are exact.
     """
     if region.everything:
         every = mesh_size(body.mesh).nodes
@@ -233,12 +236,14 @@ def _nodes(body: Placed, region: Region) -> tuple[int, int, bool]:
 
 
 def _counted(mesh: Generated) -> bool:
-    """Whether the nodes of a mesh are known exactly."""
+    """Whether the number of nodes of the mesh is known exactly."""
     return mesh.generator == "structured" and not isinstance(mesh, Sphere)
 
 
 def _grid_nodes(body: Placed, region: Region) -> int | None:
-    """Returns the nodes of a block of cubes in a box; None for other meshes, and for turned blocks with many nodes."""
+    """Returns the number of nodes of a block of cubes in a box; None for other meshes, and for turned blocks with too
+    many nodes.
+    """
     if (planes := planes_of(body, region)) is not None:
         return math.prod(planes)
     mesh, margin = body.mesh, near(body)
@@ -252,14 +257,15 @@ def _grid_nodes(body: Placed, region: Region) -> int | None:
 
 
 def _between(body: Placed, region: Region) -> tuple[int, int]:
-    """Returns the approximate number of nodes of a body in a box, and in the box widened by half an element on all
-    sides."""
+    """Returns the approximate number of nodes of a body in a box, and that in the box widened by half an element on all
+    sides.
+    """
     return _about(body, region, 0.0), _about(body, region, 0.5 * body.mesh.element_size)
 
 
 def _about(body: Placed, region: Region, wider: float) -> int:
-    """Returns the number of nodes of a body in a box that is widened by ``wider``, m, on all sides, from the volume of
-    the body in this box.
+    """Returns the approximate number of nodes of a body in a box widened by ``wider``, m, on all sides, from the volume
+    of the body in this box.
     """
     assert region.low is not None
     assert region.high is not None

@@ -1,4 +1,4 @@
-"""Bodies at their initial position, turned as their part requires: points inside, mass and motion."""
+"""Bodies at their initial position, including the rotation of their part: test of points, mass and motion."""
 
 import itertools
 import math
@@ -10,13 +10,13 @@ from . import geometry
 from .geometry import Generated, Vector, across, index
 
 LATTICE = 20
-"""Number of sampling points per direction of a body: 8,000 points in all, and moments of inertia within 1 % (chosen
-value)."""
+"""Number of sampling points per direction of a body (chosen value): 8,000 points in all, which give moments of inertia
+within 1 %."""
 
 
 @dataclass(frozen=True)
 class Placed:
-    """A generated body, with the rotation of its part."""
+    """A generated body at its position after the rotation of its part."""
 
     mesh: Generated
     turn: Turn | None = None
@@ -26,25 +26,25 @@ class Placed:
         return geometry.holds(self.mesh, _turned(point, self.turn, -1.0))
 
     def turned(self, point: Vector) -> Vector:
-        """Returns the position, m, of a point of the mesh of the body after the rotation of the part."""
+        """Returns the position, m, to which the rotation of the part moves a point of the mesh."""
         return _turned(point, self.turn)
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """Lowest and highest coordinates of the body, m; for a turned body the coordinates of its bounding box."""
+        """Lowest and highest coordinates of the body, m; for a turned body, those of its turned bounding box."""
         low, high = geometry.bounds(self.mesh) or ((0.0,) * 3, (0.0,) * 3)
         corners = [_turned((x, y, z), self.turn) for x, y, z in itertools.product(*zip(low, high, strict=True))]
         (a, b, c), (d, e, f) = ([pick(each) for each in zip(*corners, strict=True)] for pick in (min, max))
         return (a, b, c), (d, e, f)
 
     def points(self) -> list[Vector]:
-        """Points that fill the body evenly; the centre of the body if it is too thin for the lattice."""
+        """Points that fill the body evenly; only the centre if the body is too thin for the lattice."""
         low, high = geometry.bounds(self.mesh) or ((0.0,) * 3, (0.0,) * 3)
         inside = list(filter(geometry.round_part(self.mesh), lattice(low, high, LATTICE)))
         return [_turned(point, self.turn) for point in inside or [geometry.centre(self.mesh)]]
 
 
 def lattice(low: Vector, high: Vector, n: int) -> Iterator[Vector]:
-    """The centres of n^3 equal cells of a box."""
+    """Yields the centres of n^3 equal cells of a box."""
     (a, b, c), (d, e, f) = low, high
     for i, j, k in itertools.product(range(n), repeat=3):
         yield a + (d - a) * (i + 0.5) / n, b + (e - b) * (j + 0.5) / n, c + (f - c) * (k + 0.5) / n
@@ -62,7 +62,7 @@ def _turned(point: Vector, turn: Turn | None, sense: float = 1.0) -> Vector:
 
 
 def driven(case: Case, part: Part) -> Part:
-    """Returns a part with the initial motion of a boundary that rotates it."""
+    """Returns the part with the motion of the boundary ``rotation`` that acts on it, if there is one."""
     for _, boundary in case.boundaries_of(Rotation):
         if boundary.on is None and (not boundary.parts or part.name in boundary.parts):
             return part.model_copy(update={"velocity": (0.0, 0.0, 0.0), "spin": boundary.spin, "stretch": None})
@@ -70,9 +70,7 @@ def driven(case: Case, part: Part) -> Part:
 
 
 def velocity(part: Part, point: Vector) -> Vector:
-    """Returns the velocity, m/s, of a part at ``point``, m, at the start, without the random velocities of
-    ``jitter``.
-    """
+    """Returns the initial velocity, m/s, of a part at ``point``, m, without the random velocities of ``jitter``."""
     x, y, z = part.velocity
     if part.spin is not None:
         a, b, c = part.spin.rate
@@ -86,7 +84,7 @@ def velocity(part: Part, point: Vector) -> Vector:
 
 @dataclass(frozen=True)
 class Bulk:
-    """Mass, box and motion of the modelled part of a body at the start."""
+    """Mass, bounding box and motion of the modelled part of a body at the start."""
 
     mass: float
     """Mass, kg."""
@@ -98,7 +96,7 @@ class Bulk:
     energy: float
     """Kinetic energy, J, without the random velocities of ``jitter``."""
     speed: float
-    """Largest speed, m/s."""
+    """Largest speed of a point of the body, m/s."""
 
     @property
     def extent(self) -> Vector:
@@ -108,8 +106,8 @@ class Bulk:
 
 
 def bulk(part: Part, mesh: Generated, density: float) -> Bulk:
-    """Returns mass, box and motion of ``part`` from its generated ``mesh`` and the mass of the mesh. A motion other
-    than uniform translation is computed from points inside of the body.
+    """Returns mass, bounding box and motion of ``part`` from its generated ``mesh``. A motion other than uniform
+    translation is summed over points inside the body.
     """
     given = part.rigid.mass if part.rigid is not None else None
     body, mass = Placed(mesh, part.turn), given or density * geometry.volume(mesh)
@@ -125,8 +123,8 @@ def bulk(part: Part, mesh: Generated, density: float) -> Bulk:
 
 
 def with_inertia(part: Part, mass: float, middle: Vector) -> tuple[Vector, float] | None:
-    """Returns momentum and kinetic energy at the start of a rigid part with given inertia; None for any other part.
-    ``middle``: centre of mass of the body, used if the case gives none.
+    """Returns the initial momentum, N s, and kinetic energy, J, of a rigid part whose inertia the case gives; None for
+    any other part. ``middle``: centre of mass that is used if the case gives none.
     """
     rigid = part.rigid
     if rigid is None or rigid.inertia is None:

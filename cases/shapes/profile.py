@@ -1,8 +1,8 @@
-"""Outlines of bodies of revolution: the radius as a function of the height, with volume, area and other integrals by
-formula.
+"""Outlines of bodies of revolution: the radius as a function of the height, with formulas for volume, area and other
+integrals.
 
-Heights z run along the axis from the low end of the body, radii r from the axis. An outline is a sequence of lines
-and arcs from one end to the other; a flat face closes an end whose radius is not 0.
+Heights z are measured along the axis from the low end of the body, radii r from the axis. An outline is a sequence of
+lines and arcs from the low end to the high end. A flat face closes an end whose radius is not 0.
 """
 
 import math
@@ -12,7 +12,7 @@ from ..model.bodies import Cone, Hemisphere, Ogive, SphericalCap
 from ..model.forms import BallPiece, ConeForm, OgiveForm
 
 _TIP = 1e-7
-"""Largest radius of the end of an arc that counts as on the axis, divided by the height: the square root of the
+"""Radius of the end of an arc up to which this end counts as on the axis, divided by the height: the square root of the
 rounding error."""
 
 Revolved = Cone | Ogive | Hemisphere | SphericalCap
@@ -33,11 +33,11 @@ class Line:
         return self.r0 + (self.r1 - self.r0) * (z - self.z0) / (self.z1 - self.z0)
 
     def volume(self) -> float:
-        """Volume of the frustum below the line, m^3."""
+        """Volume of the frustum that the line encloses, m^3."""
         return math.pi / 3.0 * (self.z1 - self.z0) * (self.r0**2 + self.r0 * self.r1 + self.r1**2)
 
     def side(self) -> float:
-        """Area of the curved face that the line makes around the axis, m^2."""
+        """Area of the surface that the line makes when it turns around the axis, m^2."""
         return math.pi * (self.r0 + self.r1) * math.hypot(self.z1 - self.z0, self.r1 - self.r0)
 
     def section(self) -> float:
@@ -49,7 +49,7 @@ class Line:
         return max(self.r0, self.r1)
 
     def lowest(self, along: float, out: float) -> float:
-        """The smallest value of ``along`` z - ``out`` r on the line, m, for ``out`` not below 0."""
+        """Smallest value of ``along`` z - ``out`` r on the line, m, for ``out`` of at least 0."""
         return min(along * self.z0 - out * self.r0, along * self.z1 - out * self.r1)
 
     def length(self) -> float:
@@ -57,13 +57,13 @@ class Line:
         return math.hypot(self.z1 - self.z0, self.r1 - self.r0)
 
     def mirrored(self, top: float) -> "Line":
-        """Returns the line as seen from the other end of a body of height ``top``, m."""
+        """Returns the line with heights measured from the other end of a body of height ``top``, m."""
         return Line(top - self.z1, self.r1, top - self.z0, self.r0)
 
 
 @dataclass(frozen=True)
 class Arc:
-    """The arc r = rc + sqrt(radius^2 - (z - zc)^2) from the height z0 to z1."""
+    """An arc r = rc + sqrt(radius^2 - (z - zc)^2) between the heights z0 and z1."""
 
     z0: float
     z1: float
@@ -72,7 +72,7 @@ class Arc:
     radius: float
 
     def at(self, z: float) -> float:
-        """The radius of the outline on the arc at a height, m."""
+        """Radius of the outline at a height on the arc, m."""
         return max(0.0, self.rc + self._rise(z - self.zc))
 
     @property
@@ -86,7 +86,7 @@ class Arc:
         return self.at(self.z1)
 
     def volume(self) -> float:
-        """Volume of revolution of the arc: pi times the integral of r^2, m^3."""
+        """Volume that the arc encloses when it turns around the axis, pi times the integral of r^2, m^3."""
 
         def integral(u: float) -> float:
             return (self.rc**2 + self.radius**2) * u - u**3 / 3.0 + 2.0 * self.rc * self._under(u)
@@ -94,7 +94,9 @@ class Arc:
         return math.pi * (integral(self.z1 - self.zc) - integral(self.z0 - self.zc))
 
     def side(self) -> float:
-        """Area of revolution of the arc: 2 pi times the integral of r over the length of the arc, m^2."""
+        """Area of the surface that the arc makes when it turns around the axis, 2 pi times the integral of r over its
+        length, m^2.
+        """
         return 2.0 * math.pi * self.radius * (self.rc * self._angle() + self.z1 - self.z0)
 
     def section(self) -> float:
@@ -106,7 +108,7 @@ class Arc:
         return self.rc + self.radius if self.z0 <= self.zc <= self.z1 else max(self.r0, self.r1)
 
     def lowest(self, along: float, out: float) -> float:
-        """The smallest value of ``along`` z - ``out`` r on the arc, m, for ``out`` not below 0."""
+        """Smallest value of ``along`` z - ``out`` r on the arc, m, for ``out`` of at least 0."""
         ends = [along * self.z0 - out * self.r0, along * self.z1 - out * self.r1]
         length = math.hypot(along, out)
         touch = self.zc - self.radius * along / length if length else self.z0
@@ -118,14 +120,14 @@ class Arc:
         return self.radius * self._angle()
 
     def mirrored(self, top: float) -> "Arc":
-        """Returns the arc as seen from the other end of a body of height ``top``, m."""
+        """Returns the arc with heights measured from the other end of a body of height ``top``, m."""
         return Arc(top - self.z1, top - self.z0, top - self.zc, self.rc, self.radius)
 
     def _rise(self, u: float) -> float:
         return math.sqrt(max(0.0, self.radius**2 - u**2))
 
     def _under(self, u: float) -> float:
-        """Returns the integral of the rise of an arc, sqrt(radius^2 - u^2), from 0 to ``u``."""
+        """Returns the integral of sqrt(radius^2 - u^2) from 0 to ``u``, m^2."""
         return 0.5 * (u * self._rise(u) + self.radius**2 * math.asin(_share(u / self.radius)))
 
     def _angle(self) -> float:
@@ -138,7 +140,7 @@ Segment = Line | Arc
 
 @dataclass(frozen=True)
 class Profile:
-    """The outline of a body of revolution, from its low to its high end."""
+    """The outline of a body of revolution from its low end to its high end."""
 
     segments: tuple[Segment, ...]
 
@@ -149,7 +151,7 @@ class Profile:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Radii of the flat faces at the low end and the high end, m; 0 if an end has no flat face."""
+        """Radii of the flat faces at the low and the high end, m; 0 for an end without a flat face."""
         low, high = (r if r > _TIP * self.height else 0.0 for r in (self.segments[0].r0, self.segments[-1].r1))
         return low, high
 
@@ -174,12 +176,12 @@ class Profile:
         return max(each.widest() for each in self.segments)
 
     def lowest(self, along: float, out: float) -> float:
-        """The smallest value of ``along`` z - ``out`` r on the outline, m, for ``out`` not below 0."""
+        """Smallest value of ``along`` z - ``out`` r on the outline, m, for ``out`` of at least 0."""
         return min(each.lowest(along, out) for each in self.segments)
 
 
 def profile(mesh: RevolvedForm) -> Profile:
-    """Returns the outline of a body whose sizes fit together (module ``form_checks``)."""
+    """Returns the outline of a body whose sizes have passed the checks of the module ``form_checks``."""
     if isinstance(mesh, ConeForm):
         return Profile((Line(0.0, mesh.radius, mesh.length, mesh.top_radius),))
     found = _ogive(mesh) if isinstance(mesh, OgiveForm) else (_cap(mesh),)
@@ -188,8 +190,8 @@ def profile(mesh: RevolvedForm) -> Profile:
 
 
 def tips(mesh: RevolvedForm) -> list[tuple[float, float]]:
-    """Returns, for both ends of a body, the radius of a flat or round tip, m, 0 for a sharp tip, and the slope of the
-    outline at the end. Only a sharp tip uses the slope.
+    """Returns, for both ends of a body, the radius of the flat or round tip, m (0 for a sharp tip), and the slope of
+    the outline at the end. The slope is used only for a sharp tip.
     """
     outline = profile(mesh)
     small = 1e-4 * outline.height
@@ -205,8 +207,9 @@ def _cap(mesh: BallPiece) -> Arc:
 
 
 def arc_of(mesh: OgiveForm) -> Arc:
-    """Returns the arc of the sharp nose, which begins at height 0: through (0, R) and (L, 0), with the centre of the
-    arc beyond the axis. For a tangent ogive the centre of the arc is at height 0: L^2 = radius^2 - (radius - R)^2.
+    """Returns the arc of a sharp nose that begins at height 0. The arc passes through (z, r) = (0, R) and (L, 0), and
+    its centre is on the other side of the axis. For a tangent ogive the centre is at height 0: L^2 = radius^2 - (radius
+    - R)^2.
     """
     if mesh.nose is None or mesh.crh is None:
         radius = (mesh.nose**2 + mesh.radius**2) / (2.0 * mesh.radius) if mesh.nose else arc_radius(mesh)
@@ -218,18 +221,19 @@ def arc_of(mesh: OgiveForm) -> Arc:
 
 
 def tangent(nose: float, radius: float) -> float:
-    """Returns the calibre radius head (radius of the arc over the diameter) of a tangent ogive of length ``nose``, m,
-    on a shank of ``radius``, m."""
+    """Returns the calibre radius head (radius of the arc divided by the diameter) of a tangent ogive with a nose of
+    length ``nose``, m, on a shank of ``radius``, m.
+    """
     return (nose / (2.0 * radius)) ** 2 + 0.25
 
 
 def arc_radius(mesh: OgiveForm) -> float:
-    """Radius of the arc of the nose from its calibre radius head, m."""
+    """Radius of the arc of the nose, m, from its calibre radius head."""
     return 2.0 * mesh.radius * (mesh.crh or 0.5)
 
 
 def nose_length(mesh: OgiveForm) -> float:
-    """Length of the nose to the sharp tip, m; D sqrt(crh - 1/4) for a tangent ogive."""
+    """Length of the nose up to its sharp tip, m; for a tangent ogive D sqrt(crh - 1/4) with the diameter D."""
     return mesh.nose or 2.0 * mesh.radius * math.sqrt((mesh.crh or 0.5) - 0.25)
 
 
@@ -246,8 +250,9 @@ def _ogive(mesh: OgiveForm) -> tuple[Segment, ...]:
 
 
 def _rounded(nose: Arc, tip: float) -> tuple[Arc, Arc]:
-    """Returns the nose with a ball of radius ``tip`` inside that touches the arc. The centre of the ball is on the
-    axis, and its distance from the centre of the arc is the difference of the radii.
+    """Returns the arc of a nose that is rounded by a ball of radius ``tip``, m, and the arc of this ball. The ball
+    touches the arc of the nose from inside: its centre is on the axis, and the distance of the two centres is the
+    difference of the radii.
     """
     centre = nose.zc + math.sqrt(max(0.0, (nose.radius - tip) ** 2 - nose.rc**2))
     touch = centre + (centre - nose.zc) * tip / (nose.radius - tip)

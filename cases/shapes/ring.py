@@ -1,22 +1,22 @@
-"""The angles of a ring sector around its axis, as far as it is modelled."""
+"""The angles around its axis that a ring sector covers, limited to its modelled part."""
 
 import math
 
 from ..model.bodies import RingSector
 
 Angles = tuple[float, float]
-"""Start and end of the ring sector, rad, from the first direction across the axis to the second."""
+"""Start and end of a range of angles, rad, measured from the first direction across the axis towards the second."""
 
 _WINDOW: dict[str, Angles] = {"half": (-0.5 * math.pi, 0.5 * math.pi), "quarter": (0.0, 0.5 * math.pi)}
-"""The ranges of angles that are modelled in a sector."""
+"""Ranges of the angles that ``half`` and ``quarter`` keep."""
 
 _QUARTERS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 """Cosines and sines of the multiples of a quarter turn."""
 
 
 def angles(mesh: RingSector) -> list[Angles]:
-    """Returns the ranges of modelled angles: two ranges if a plane of the sector leaves both ends, otherwise one
-    range.
+    """Returns the ranges of modelled angles: one range, or two if a plane of the sector cuts away the middle of the
+    ring sector.
     """
     begin = math.remainder(mesh.start, 2.0 * math.pi)
     if mesh.sector == "full":
@@ -28,19 +28,19 @@ def angles(mesh: RingSector) -> list[Angles]:
 
 
 def angle(mesh: RingSector) -> float:
-    """Returns the sum of the modelled angles, rad."""
+    """Returns the total angle of these ranges, rad."""
     return math.fsum(b - a for a, b in angles(mesh))
 
 
 def holds_angle(mesh: RingSector, x: float, y: float) -> bool:
-    """Whether the direction of a point from the axis is modelled."""
+    """Whether the direction (x, y) from the axis lies in a modelled range."""
     at = math.atan2(y, x)
     return any(a <= at + turn <= b for a, b in angles(mesh) for turn in (-2.0 * math.pi, 0.0, 2.0 * math.pi))
 
 
 def extremes(mesh: RingSector, whole: bool = False) -> tuple[Angles, Angles]:
-    """Lowest and highest value of both coordinates across the axis, m, measured from the axis. ``whole``: whether the
-    values are those of the full body.
+    """Lowest and highest value of each of the two coordinates across the axis, m, measured from the axis. ``whole``:
+    whether the full body is used and not only its modelled part.
     """
     begin = math.remainder(mesh.start, 2.0 * math.pi)
     ranges = [(begin, begin + mesh.angle)] if whole else angles(mesh)

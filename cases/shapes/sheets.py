@@ -1,4 +1,4 @@
-"""Surfaces of bodies as sheets: functions of two parameters from 0 to 1."""
+"""Surfaces of bodies as sheets (pieces of surface): each sheet is a function of two parameters from 0 to 1."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -9,9 +9,9 @@ from .geometry import Generated, Vector, across, bounds, centre, index
 from .profile import Revolved, Segment, profile
 
 Point = Callable[[float, float], Vector]
-"""Function that returns the point of a surface at two parameters from 0 to 1."""
+"""Function that returns a point of a sheet, m, for two parameters from 0 to 1."""
 Sheet = tuple[Point, float, float]
-"""A part of a surface, with the approximate lengths of the part along both parameters, m."""
+"""A sheet: its function, and its approximate lengths along both parameters, m."""
 
 
 def sheets(mesh: Generated) -> Iterator[Sheet]:
@@ -45,7 +45,7 @@ def _block(mesh: Box | Plate) -> Iterator[Sheet]:
 
 
 def _flat(d: int, at: float, low: Sequence[float], high: Sequence[float]) -> Sheet:
-    """The rectangle across the direction ``d`` at the coordinate ``at``."""
+    """Rectangle normal to the direction ``d`` at the coordinate ``at``, m."""
     i, j = (d + 1) % 3, (d + 2) % 3
 
     def point(u: float, v: float) -> Vector:
@@ -57,7 +57,7 @@ def _flat(d: int, at: float, low: Sequence[float], high: Sequence[float]) -> She
 
 
 def _revolved(mesh: Revolved, begin: float, end: float) -> Iterator[Sheet]:
-    """The surface of a body of revolution between the angles ``begin`` and ``end``, in multiples of pi."""
+    """Surface of a body of revolution between the angles ``begin`` and ``end``, in multiples of pi."""
     outline, turn, arc = profile(mesh), _turning(mesh, begin, end), (end - begin) * math.pi
 
     def along(each: Segment) -> Point:
@@ -83,7 +83,7 @@ def _revolved(mesh: Revolved, begin: float, end: float) -> Iterator[Sheet]:
 
 
 def _barrel(mesh: Cylinder | Tube | RingSector, begin: float, end: float) -> Iterator[Sheet]:
-    """The surface of a cylinder, a tube or a segment of these between the angles ``begin`` and ``end``, in multiples of
+    """Surface of a cylinder, a tube, or a sector of them between the angles ``begin`` and ``end``, in multiples of
     pi.
     """
     inner, outer, length = 0.0 if isinstance(mesh, Cylinder) else mesh.inner_radius, mesh.radius, mesh.length
@@ -121,14 +121,16 @@ def _ball(mesh: Sphere, begin: float, end: float) -> Iterator[Sheet]:
 
 
 def _cut(begin: float, end: float) -> tuple[float, ...]:
-    """Positions around the axis, as fractions of a turn, at which a sector is cut; empty for a whole body."""
+    """Angles around the axis, as fractions of the range from ``begin`` to ``end``, at which a sector is cut; empty for
+    a whole body.
+    """
     return () if end - begin == 2.0 else (0.0, 1.0)
 
 
 def _turning(
     mesh: Cylinder | Tube | Sphere | Revolved | RingSector, begin: float, end: float
 ) -> Callable[[float, float, float], Vector]:
-    """The point at a radius, a fraction of a turn and a height."""
+    """Function that returns the point for a radius, a fraction of the range of angles, and a height."""
     start, k, (i, j) = centre(mesh), index(mesh.axis), across(mesh.axis)
 
     def point(radius: float, u: float, height: float) -> Vector:

@@ -1,6 +1,7 @@
-"""A run as a job of a batch system: profiles of the site, record in the run's folder, script, arguments of sbatch.
+"""A run as a job of a batch system (Slurm): the profiles of the site, the record of the job in the folder of the run,
+the batch script, the arguments of sbatch.
 
-A site's settings file (its other tables are those of ``policy``)::
+Example of the settings file of a site (its other tables are described in the module ``policy``)::
 
     launcher = "slurm"                # what starts runs of the server: "local" (default) or "slurm"
     [slurm]
@@ -11,8 +12,8 @@ A site's settings file (its other tables are those of ``policy``)::
     time = "12 h"
     modules = ["gcc/13"]
 
-Users select a profile and cannot extend it: the command of a job is in ``job.json``, and the script only reads the
-command.
+Users select a profile and cannot change it: the command of a job is in the file ``job.json``, and the batch script only
+reads it from there.
 """
 
 import re
@@ -33,11 +34,11 @@ from . import policy
 
 
 class SiteError(Exception):
-    """Error in the settings file of a site. The text of this error is one line."""
+    """Error: the settings file of a site is invalid. The text of this error is one line."""
 
 
 class Profile(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """A profile: a way of requesting cores from the batch system."""
+    """A profile: settings with which the batch system gives cores to a job."""
 
     partition: str = ""
     account: str = ""
@@ -49,44 +50,42 @@ class Profile(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
     mpi: Literal["mpiexec", "srun"] = "mpiexec"
     """Command that starts the ranks inside of a job."""
     mpiexec: str = ""
-    """Path of the site's own mpiexec; empty: the mpiexec that Conoid finds."""
+    """Path of the mpiexec of the site; empty: the mpiexec that Conoid finds."""
     lines: list[str] = []
-    """Lines of the batch script before the run, as the site's MPI or file system requires."""
+    """Lines of the batch script before the run starts, for the MPI or the file system of the site."""
     options: list[str] = []
     """Further arguments of the command sbatch."""
     notice: str = "120 s"
-    """Time before the time limit at which a run receives the signal to save its state: enough for some checkpoints of
-    the largest runs (chosen value)."""
+    """Time before the time limit at which a run receives the signal to write a checkpoint; it is enough for some
+    checkpoints of the largest runs (chosen value)."""
 
 
 class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Settings of a site's Slurm."""
+    """The settings of a site for Slurm."""
 
     profiles: dict[str, Profile]
     default: str = ""
     """Profile of runs that name no profile; empty: the first profile."""
     bin: str = ""
-    """Folder of the commands sbatch, squeue, scancel, scontrol; empty: the commands are in PATH."""
+    """Folder of the commands sbatch, squeue, scancel and scontrol; empty: they are found in PATH."""
     router: str = ""
     """Address of the server's Zenoh router for compute nodes; empty: only the address of this machine."""
     listen: str = ""
     """Additional address on which the Zenoh router listens for compute nodes, such as ``tls/0.0.0.0:7448``."""
     certificate: str = ""
     key: str = ""
-    """Certificate and key of the Zenoh router; required with TLS."""
+    """Private key of the Zenoh router; with TLS, certificate and key are required."""
     authority: str = ""
-    """Certificate with which the compute nodes verify the Zenoh router: a file that the nodes can read."""
+    """Certificate with which compute nodes verify the Zenoh router; the nodes must be able to read this file."""
     poll: float = 2.0
-    """Time between two queries of Slurm's queue, s (chosen value). One squeue command reads the jobs of all runs."""
+    """Time between two calls of squeue, which ask for the jobs of all runs, s (chosen value)."""
     slots: int = 100_000
-    """Largest number of cores that are submitted at a time, including pending jobs; large because Slurm has its own
-    limits (chosen value)."""
+    """Largest number of cores of all submitted jobs together, including pending jobs (chosen value). It is large
+    because Slurm has its own limits."""
 
 
 class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Settings of a site: how runs are started. The settings in the module ``policy`` are the order, size and retention
-    of runs, and the limits of one user.
-    """
+    """The settings of a site that say how runs are started. The module ``policy`` has the other settings."""
 
     launcher: Literal["local", "slurm"] = "local"
     slurm: Slurm | None = None
@@ -100,56 +99,56 @@ class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
 
 _Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,127}\Z")]
 _Number = Annotated[str, msgspec.Meta(pattern=r"^([0-9]+(_[0-9]+)?)?\Z")]
-"""Whether a value of a record is safe as an argument of a command: the value cannot be an option of the command."""
+"""Number of a job or a task, as text. The pattern ensures that the text cannot be read as an option when it is an
+argument of a command."""
 
 
 class Job(msgspec.Struct, kw_only=True, frozen=True):
-    """File job.json: the command of a job of the batch system. The file job.json is on disk before the job is submitted
-    to the batch system.
+    """The file job.json: the record of a job of the batch system. It is on disk before the job is submitted.
 
-    Readers of a folder use only the name and the number in job.json; ``command`` and ``bin`` are for the job.
+    Programs that read the folder of a run use only ``name`` and ``job``; ``command`` and ``bin`` are for the job.
     """
 
     run: str
     name: _Name
-    """Unique name of the job, so that the job is found even if its number was not stored."""
+    """Unique name of the job: a program finds the job by this name if its number was not stored."""
     attempt: int
     ranks: int
     profile: str
     command: list[str]
-    """Command that starts the ranks, without ``--restart``."""
+    """Command that starts the ranks, without the option ``--restart``."""
     submitted: float
     """Unix time of the submission, s."""
     notice: float
-    """Time before the time limit at which the run receives the signal, s."""
+    """Time before the time limit at which the run receives the signal to write a checkpoint, s."""
     bin: str = ""
     """Folder of Slurm's commands; empty: the commands are in PATH."""
     task: int | None = None
-    """Index in a job array, which is one job for several runs; None: the run has a separate job."""
+    """Index of the run in a job array, which is one job for several runs; None: the run has a job of its own."""
     array: str = ""
     """Folder of the job array."""
     job: _Number = ""
-    """Number that the batch system has given the job; empty until the number is known."""
+    """Number of the job in the batch system; empty until it is known."""
     accounting: dict[str, str] = {}
-    """State that the batch system reported for a job that has ended."""
+    """Properties of a job that has ended, as the batch system reported them."""
     threads: int = 1
-    """Number of cores of each rank."""
+    """Number of threads, and of cores, of each rank."""
 
     @property
     def key(self) -> str:
-        """Unique name of the job, with its index in a job array."""
+        """Unique name of the job; for a task of a job array with the index of the task."""
         return key_of(self.name, self.task)
 
 
 class Access(msgspec.Struct, kw_only=True, frozen=True):
-    """Network address and token with which the ranks of a job publish, in a hidden file for its owner only."""
+    """Hidden file, readable for its owner only: address and token with which the ranks of a job publish messages."""
 
     endpoint: str
     prefix: str
     user: str = ""
     password: str = ""
     authority: str = ""
-    """Certificate authority of the Zenoh router, used with TLS."""
+    """Certificate with which the Zenoh router is verified; only with TLS."""
 
 
 _job, _access = msgspec.json.Decoder(Job), msgspec.json.Decoder(Access)
@@ -211,7 +210,7 @@ def new_job(
     place: str = "",
     threads: int = 1,
 ) -> Job:
-    """Returns the record of an attempt that is not submitted yet."""
+    """Returns the record of a new attempt to run a case, before it is submitted."""
     word = re.sub(r"[^A-Za-z0-9_.-]", "_", run)[:60]
     return Job(
         run=run, name=f"conoid-{word}-{attempt}-{secrets.token_hex(4)}", attempt=attempt, ranks=ranks, threads=threads,
@@ -226,8 +225,8 @@ def key_of(name: str, task: int | None) -> str:
 
 
 def script(profile: Profile, python: str) -> str:
-    """Returns the batch script: the site's lines, then the run. The batch script does not depend on the run or its
-    owner.
+    """Returns the batch script: the lines of the profile, then the command that starts the run. The script is the same
+    for all runs and users.
     """
     modules = [f"module load {shlex.quote(module)}" for module in profile.modules]
     lines = "".join(f"{line}\n" for line in [*modules, *profile.lines])
@@ -235,21 +234,22 @@ def script(profile: Profile, python: str) -> str:
 
 
 def sbatch_words(job: Job, profile: Profile, folder: Path) -> list[str]:
-    """Returns the arguments of the command sbatch. Only the script receives the signal TERM, ``notice`` before the time
-    limit; the program of the script signals the ranks.
+    """Returns the arguments of sbatch for a job. Only the script receives the signal TERM, ``notice`` before the time
+    limit; the program that the script starts then sends signals to the ranks.
     """
     return _words(job, profile, folder, f"{layout.LOGS}/{layout.LAUNCHER_LOG}")
 
 
 def array_words(job: Job, profile: Profile, tasks: Iterable[int]) -> list[str]:
-    """Returns the arguments of the command sbatch for some tasks of a job array that contains ``job``."""
+    """Returns the arguments of sbatch for some tasks of the job array to which ``job`` belongs."""
     folder = Path(job.array)
     return [f"--array={','.join(map(str, tasks))}", *_words(job, profile, folder, "%a.log")]
 
 
 def _words(job: Job, profile: Profile, folder: Path, log: str) -> list[str]:
-    """Returns the path of ``log`` below ``folder`` for the command sbatch. Slurm replaces patterns with a percent sign
-    and removes backslashes, even in the name of the folder; for such a folder the job opens its log itself.
+    """Returns the arguments of sbatch that are the same for jobs and job arrays. ``log``: path of the log file,
+    relative to ``folder``. Slurm interprets percent signs in this path, also in the name of the folder, and removes
+    backslashes. If the folder has such characters, the job opens its log itself.
     """
     if set(str(folder)) & {"%", "\\"}:
         log = "/dev/null"
@@ -266,11 +266,12 @@ def _words(job: Job, profile: Profile, folder: Path, log: str) -> list[str]:
 
 
 def starter(profile: Profile, ranks: int, found: Callable[[], Sequence[str]], threads: int = 1) -> list[str]:
-    """Returns the command that starts ``ranks`` ranks with ``threads`` threads each inside of a job, before the
-    worker's command.
+    """Returns the command that starts ``ranks`` ranks with ``threads`` threads each inside a job; the command of the
+    worker follows it.
 
-    ``found``: function that returns an mpiexec if the profile has none. The wheel of MPICH uses PMI2; srun takes
-    neither the number of ranks nor the number of threads from the job (srun(1)), and binds each rank to separate cores.
+    ``found``: function that returns the path of an mpiexec, for a profile that has none. MPICH from its Python package
+    needs PMI2. srun does not take the numbers of ranks and threads from the job (srun(1)); it binds each rank to its
+    own cores.
     """
     if profile.mpi == "srun":
         return ["srun", "--mpi=pmi2", f"--ntasks={ranks}", f"--cpus-per-task={threads}", "--cpu-bind=cores"]
@@ -278,7 +279,7 @@ def starter(profile: Profile, ranks: int, found: Callable[[], Sequence[str]], th
 
 
 def read_job(folder: Path) -> Job | None:
-    """Reads the job record in a run's folder; None if there is none. Raises OSError, msgspec.MsgspecError."""
+    """Returns the job record of a run; None if there is none. Raises OSError, msgspec.MsgspecError."""
     try:
         return _job.decode(whole.read(folder / layout.JOB))
     except FileNotFoundError:
@@ -286,7 +287,7 @@ def read_job(folder: Path) -> Job | None:
 
 
 def read_access(folder: Path) -> Access | None:
-    """Reads the address at which the ranks publish; None if there is none. Raises OSError, msgspec.MsgspecError."""
+    """Returns the file ``Access`` of a run; None if there is none. Raises OSError, msgspec.MsgspecError."""
     try:
         return _access.decode(whole.read(folder / layout.ACCESS))
     except FileNotFoundError:
@@ -294,5 +295,5 @@ def read_access(folder: Path) -> Access | None:
 
 
 def to_json(record: Job | Access) -> bytes:
-    """Returns the job record as text, in the form of the file."""
+    """Returns a record as the text of its file."""
     return msgspec.json.format(msgspec.json.encode(record), indent=2)

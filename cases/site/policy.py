@@ -1,6 +1,7 @@
-"""Settings of a site: queue, quotas of users, limits of runs, retention of runs and files, limits of HTTP.
+"""Settings of a site: the order of runs in the queue, quotas of users, limits of a run, retention of runs and files,
+limits of HTTP requests.
 
-Tables of a site's settings file::
+Example of the tables of a site's settings file::
 
     [queue]
     half_life = "168 h"               # after it the past usage of a user counts half
@@ -35,34 +36,34 @@ import msgspec
 from ..units import parse_quantity
 
 PRIORITY = 100
-"""Largest priority; the smallest priority is its negative (chosen value)."""
+"""Largest priority of a user; the smallest is its negative (chosen value)."""
 
 
 class Share(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """Settings of a site for one user."""
 
     share: float = 1.0
-    """Share of the machine that the user gets, relative to other users."""
+    """Fraction of the machine that the user gets, relative to other users with runs in the queue."""
     priority: int = 0
-    """Runs of users with a higher priority start first."""
+    """Priority of the user: runs of users with a higher priority start first."""
 
 
 class Queue(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Settings of the queue."""
+    """Settings of the queue of runs."""
 
     half_life: str = "168 h"
-    """Half-life of the past usage of a user: a week (chosen value)."""
+    """Time after which the past usage of a user counts half: a week (chosen value)."""
     memory: int | None = None
-    """Memory for all runs together, bytes, compared with the estimates of the runs; absent: the memory of the
+    """Memory for all concurrent runs, bytes. The estimates of the runs are compared with it. Absent: the memory of the
     machine."""
     threads: int | None = None
-    """Threads of each rank of a run whose case does not give ``run.threads``; absent: all cores of the server divided
-    by the number of ranks, at most one for 3,000 tets, and in a batch system one."""
+    """Threads of each rank of a run whose case does not give ``run.threads``. Absent: the cores of the server divided
+    by the number of ranks, at most one thread for each 3,000 tets; in a batch system one thread."""
     users: dict[str, Share] = {}
 
     @property
     def forgets(self) -> float:
-        """The half-life of past usage, s."""
+        """Half-life of past usage, s."""
         return parse_quantity(self.half_life, "s")
 
     def of(self, owner: str) -> Share:
@@ -71,46 +72,47 @@ class Queue(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
 
 
 class Quota(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Quota of a user; None: no limit."""
+    """Quota of a user. None: no limit."""
 
     queued: int | None = None
-    """Largest number of runs that have not ended; further runs are refused."""
+    """Largest number of runs of the user that have not ended; a further run is refused."""
     running: int | None = None
-    """Largest number of concurrent runs; further runs wait."""
+    """Largest number of concurrent runs of the user; further runs wait."""
     core_seconds: float | None = None
-    """Largest recent usage, halved after each half-life; runs of a user with a larger usage wait."""
+    """Largest usage of the user, core seconds, where past usage counts half after each half-life; while it is exceeded,
+    the runs of the user wait."""
     output_bytes: int | None = None
-    """Largest size of all folders of the user's runs; at a larger size further runs are refused."""
+    """Largest size of all run folders of the user, bytes; while it is exceeded, new runs are refused."""
 
 
 class RunCaps(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Limits of a run; None: the default limit of the server."""
+    """Limits of each run. None: the default of the server."""
 
     elements: int | None = None
     steps: int | None = None
     memory: int | None = None
     core_seconds: float | None = None
-    """Core seconds of a run: estimated at submission, and measured during the run."""
+    """Largest CPU time of a run, core seconds: estimated at submission, and measured during the run."""
     wall_time: float | None = None
-    """Wall time of a run, s."""
+    """Largest wall time of a run, s."""
     output_bytes: int | None = None
-    """Size of the folder of a run; a larger run is stopped, and keeps its results so far."""
+    """Largest size of the folder of a run, bytes. A run that exceeds it is stopped and keeps its results so far."""
 
 
 class Retention(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Retention of runs that have ended; runs with the label ``keep`` are kept without limit."""
+    """Rules for removing runs that have ended. Runs with the label ``keep`` are never removed."""
 
     age: str = ""
-    """Age since the end of the run; empty: no limit."""
+    """Time since the end of a run after which it is removed; empty: never."""
     bytes: int | None = None
-    """Size of all folders of runs together; the oldest runs are removed first. None: the size has no limit."""
+    """Largest size of all run folders together, bytes; the oldest runs are removed first. None: no limit."""
     every: str = "10 min"
-    """Time between two checks of age and size; reading the sizes of 10,000 folders takes seconds (reason of the chosen
+    """Time between two checks of age and size. Reading the sizes of 10,000 folders takes seconds (reason of the chosen
     value)."""
 
     @property
     def oldest(self) -> float | None:
-        """The age of runs in s."""
+        """Time since its end after which a run is removed, s; None: never."""
         return parse_quantity(self.age, "s") if self.age else None
 
     @property
@@ -120,56 +122,54 @@ class Retention(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
 
 
 class Files(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Limits of the files that a user uploads with cases."""
+    """Limits of the files that users upload for their cases."""
 
     size: int = 4 << 30
-    """Largest size of one file in bytes: ten million tets as text (chosen value). A larger file is refused with HTTP
+    """Largest size of one file, bytes: ten million tets as text (chosen value). A larger file is refused with the HTTP
     status 413."""
     bytes: int = 16 << 30
-    """Largest size in bytes of all files of a user, including uploads in progress (chosen value). Files above this size
-    are refused with HTTP status 429."""
+    """Largest size of all files of a user together, bytes, including uploads in progress (chosen value). Files beyond
+    it are refused with the HTTP status 429."""
     number: int = 1000
-    """Largest number of files of a user; a list of so many files takes some 10 ms (reason of the chosen value). Files
-    above this number are refused with HTTP status 429."""
+    """Largest number of files of a user. Listing so many files takes some 10 ms (reason of the chosen value). Files
+    beyond it are refused with the HTTP status 429."""
     age: str = "24 h"
-    """Time for which a file without a run and without requests is kept (chosen value). A case follows its files within
-    seconds, and an interrupted upload can continue the next morning."""
+    """Time after which a file that no run uses and no request has read is removed (chosen value). A case is normally
+    submitted seconds after its files, and an interrupted upload can continue the next morning."""
 
     @property
     def oldest(self) -> float:
-        """The age of files in s."""
+        """Time after which an unused file is removed, s."""
         return parse_quantity(self.age, "s")
 
 
 class Http(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Limits of concurrent requests of one user; the limits also apply to a network address whose requests have no
-    valid token.
-    """
+    """Limits of the concurrent requests of one user, and of one network address whose requests have no valid token."""
 
     requests: int = 16
-    """Largest number of requests in progress (chosen value); their bodies, of 1 MiB at most, and their answers are in
-    memory."""
+    """Largest number of requests that are processed at once (chosen value). Their bodies (at most 1 MiB each) and their
+    answers are in memory."""
     waiting: int = 200
-    """Largest number of waiting requests (chosen value). Requests above this number are refused with HTTP status
+    """Largest number of further requests that wait (chosen value). Requests beyond it are refused with the HTTP status
     429."""
     streams: int = 100
-    """Largest number of long answers: event streams, followed logs, waits for a change, and downloads (chosen value).
-    Long answers above this number are refused with HTTP status 429."""
+    """Largest number of long responses at once: event streams, logs that are followed, waits for a change, and
+    downloads (chosen value). Further ones are refused with the HTTP status 429."""
     threads: int = 2
-    """Largest number of answers that are computed, or wait for the disk, at a time (chosen value). A server has 64
-    threads for all users, and one Python process."""
+    """Largest number of responses that are computed or wait for the disk at once (chosen value). The server is one
+    Python process with 64 threads for all users."""
     patience: str = "20 s"
-    """Time after which a request is answered with HTTP status 503 because the disk or the database does not respond
-    (chosen value)."""
+    """Time after which a request gets the HTTP status 503 because the disk or the database does not respond (chosen
+    value)."""
 
     @property
     def seconds(self) -> float:
-        """The patience with the disk and the database, s."""
+        """Time to wait for the disk or the database, s."""
         return parse_quantity(self.patience, "s")
 
 
 def check(queue: Queue, quota: Quota, caps: RunCaps, retention: Retention, http: Http, files: Files) -> None:
-    """Checks the settings. Raises ValueError with the key, the value, and the allowed values."""
+    """Checks the settings of all tables. Raises ValueError with the key, the value, and the allowed values."""
     for key, text in (
         ("queue.half_life", queue.half_life), ("retention.every", retention.every), ("http.patience", http.patience),
         ("files.age", files.age),

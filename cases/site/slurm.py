@@ -1,7 +1,8 @@
-"""Slurm through its commands with machine-readable output: submission without duplicates, queue, end of jobs.
+"""Slurm through its commands, whose output is machine-readable: submission without duplicates, list of jobs, end of
+jobs.
 
-The controller of Slurm writes a new job to disk some seconds after it has confirmed the job, and loses the job in a
-crash before the write. Therefore a job is searched for before it is submitted again (module ``slurm_call``).
+The controller of Slurm writes a new job to disk some seconds after confirming it. If it crashes before, the job is
+lost. Therefore this module searches for a job before it submits the job again (module ``slurm_call``).
 """
 
 import fcntl
@@ -19,31 +20,31 @@ from .slurm_call import AwayError, LaterError, RefusedError, SlurmError, away, c
 
 PENDING = frozenset({"PENDING", "REQUEUED", "REQUEUE_HOLD", "REQUEUE_FED", "RESV_DEL_HOLD", "SPECIAL_EXIT"})
 NOT_LAUNCHED = "launch failed requeued held"
-"""Reason of a pending job, written with spaces or underscores: the node failed to start the job, and Slurm waits for an
-operator."""
+"""Reason, as Slurm prints it, for a pending job that a node failed to start. Slurm then holds the job until it is
+released. The words may be separated by underscores."""
 FINAL = frozenset(
     {"BOOT_FAIL", "CANCELLED", "COMPLETED", "DEADLINE", "FAILED", "NODE_FAIL", "OUT_OF_MEMORY", "PREEMPTED", "REVOKED",
      "TIMEOUT"}
 )  # fmt: skip
-"""Final states of squeue(1), in which a job has ended."""
+"""Final states of a job in the output of squeue(1)."""
 _ONE_BY_ONE = 200
-"""Largest number of names in one squeue command, so that the command line has at most 10 kB (chosen value)."""
+"""Largest number of job names in one squeue command; its command line then has at most 10 kB (chosen value)."""
 
 
 _NUMBER = re.compile(r"\d+(_\d+|_\[[^|]*\])?(\+\d+)?")
-"""Pattern of the number of a job, of a task of a job array, of waiting tasks, or of a component of a heterogeneous
-job."""
+"""Pattern of the numbers that Slurm prints: a job, a task of a job array, the waiting tasks of a job array, or a
+component of a heterogeneous job."""
 
 
 class Entry(NamedTuple):
-    """A job in the list that squeue prints."""
+    """A job in the output of squeue."""
 
     job: str
     state: str
     start: float
-    """Unix time of the start of the job, s. For a pending job the start time is an estimate; 0 if unknown."""
+    """Unix time of the start of the job, s. For a pending job Slurm estimates this time; 0 if unknown."""
     name: str
-    """Name of the job; a task of a job array has the name with the index, as ``batch.key_of`` writes it."""
+    """Name of the job; for a task of a job array, the name with the index of the task (``batch.key_of``)."""
     reason: str
 
     @property
@@ -53,8 +54,8 @@ class Entry(NamedTuple):
 
 
 def jobs(place: str, *names: str) -> list[Entry]:
-    """Returns the jobs of this user that Slurm remembers: all jobs, or only the jobs with the given names. Names of
-    other jobs may contain line breaks. Raises AwayError or RefusedError.
+    """Returns the jobs of this user that Slurm still lists: all of them, or only those with the given names. Names of
+    other jobs of the user may contain line breaks. Raises AwayError or RefusedError.
     """
     found: list[Entry] = []
     words = ["squeue", "--noheader", "--array", "--states=all", f"--user={os.getuid()}", "--format=%i|%T|%S|%j|%r"]
@@ -68,9 +69,9 @@ def jobs(place: str, *names: str) -> list[Entry]:
 
 
 def _entries(lines: Sequence[str], names: Set[str]) -> list[Entry]:
-    """Reads the list that squeue prints. An invalid line makes the whole list invalid, because a job could be missing.
-    A line that is broken by the name of another job is no job of this list; the text after the line break belongs to
-    that name.
+    """Returns the jobs in the lines that squeue has printed. A line that is not in the expected form makes the whole
+    list invalid, because a job could be missing. Only a line break in the name of another job is accepted: the text
+    after it belongs to that name.
     """
     found, broken = [], False
     for line in lines:
@@ -86,7 +87,7 @@ def _entries(lines: Sequence[str], names: Set[str]) -> list[Entry]:
 
 
 def _key(job: str, name: str) -> str:
-    """Reads the number of a job; a task of a job array has a number such as 123_4."""
+    """Returns the name of a job with the index of its task if its number has one, such as 123_4."""
     task = job.partition("_")[2]
     return batch.key_of(name, int(task) if task.isdigit() else None)
 
@@ -99,8 +100,8 @@ def _time(text: str) -> float:
 
 
 def details(place: str, job: str) -> dict[str, str]:
-    """Returns all properties of a job from the controller; for a repeated word the first value, because paths and
-    comments come last. Raises AwayError; raises RefusedError if the job is unknown.
+    """Returns all properties of a job from the controller of Slurm. If a property is printed twice, the first value
+    counts, because paths and comments come last. Raises AwayError; raises RefusedError if the job is unknown.
     """
     output = call(place, ["scontrol", "show", "job", "--oneliner", job])
     found: dict[str, str] = {}
@@ -111,7 +112,7 @@ def details(place: str, job: str) -> dict[str, str]:
 
 
 def accounting(place: str, job: str) -> dict[str, str]:
-    """Returns the usage of a job that has ended, from the controller."""
+    """Returns the usage of a job that has ended, from the controller of Slurm."""
     wanted = ("JobState", "ExitCode", "RunTime", "StartTime", "EndTime", "NodeList", "Restarts")
     with suppress(SlurmError):
         return {name: value for name, value in details(place, job).items() if name in wanted}
@@ -119,7 +120,7 @@ def accounting(place: str, job: str) -> dict[str, str]:
 
 
 def taken(place: str, job: str) -> dict[str, str]:
-    """Returns the usage of a job that has ended, from the accounting database if there is one."""
+    """Returns the usage of a job that has ended, from the accounting database of Slurm if there is one."""
     found: dict[str, str] = {}
     fields = ("State", "ExitCode", "Elapsed", "TotalCPU", "MaxRSS", "NodeList")
     with suppress(SlurmError):
@@ -130,10 +131,11 @@ def taken(place: str, job: str) -> dict[str, str]:
 
 
 def submit(place: str, folder: Path, job: Job, profile: Profile) -> str:
-    """Returns the number of the single Slurm job for the record ``job``: an existing job, otherwise a new job.
+    """Returns the number of the Slurm job for the record ``job``: that of an existing job with this name, otherwise
+    that of a new job.
 
-    The command sbatch holds a lock of the folder, even if the process that started it dies; while the lock is held, no
-    other process submits. Raises AwayError, LaterError, RefusedError or OSError.
+    The sbatch process holds a lock on the folder, also if the process that started it dies. While the lock is held, no
+    other process submits the run. Raises AwayError, LaterError, RefusedError or OSError.
     """
     with open(folder / ".submit.lock", "a") as lock:
         try:
@@ -152,8 +154,8 @@ def submit(place: str, folder: Path, job: Job, profile: Profile) -> str:
 
 
 def _number(output: str) -> str:
-    """Reads the number of a new job from the output of ``sbatch --parsable``. Raises AwayError if the output has no
-    number.
+    """Returns the number of a new job from the output of ``sbatch --parsable``. Raises AwayError if the output contains
+    no number.
     """
     number = output.strip().partition(";")[0]
     if not number.isdecimal():
@@ -162,9 +164,9 @@ def _number(output: str) -> str:
 
 
 def submit_array(place: str, records: Sequence[Job], profile: Profile) -> dict[int, str]:
-    """Returns the number of the single job of each task of a job array. Existing jobs keep their numbers; the other
-    tasks are submitted as a new array. The lock of the job array prevents a second submission. Raises AwayError,
-    RefusedError or OSError.
+    """Returns, for each task of a job array, the number of its job. Jobs that exist already are kept; the other tasks
+    are submitted as a new array. A lock of the job array prevents a second submission at the same time. Raises
+    AwayError, RefusedError or OSError.
     """
     with open(Path(records[0].array) / ".submit.lock", "a") as lock:
         try:
@@ -182,19 +184,19 @@ def submit_array(place: str, records: Sequence[Job], profile: Profile) -> dict[i
 
 
 def cancel(place: str, job: str) -> None:
-    """Ends a job, pending or not: sends TERM, and KILL some time later. Raises AwayError; a job that has already ended
-    is no error.
+    """Ends a job, pending or running: Slurm sends TERM, and some time later KILL. Raises AwayError if the controller
+    does not answer. A job that has already ended is no error.
     """
     with suppress(RefusedError):
         call(place, ["scancel", job])
 
 
 def notify(place: str, entry: Entry) -> None:
-    """Ends a job that is pending in the list of squeue; sends TERM to the script of any other job. Raises AwayError if
-    the controller does not answer.
+    """Ends a job that was pending in the output of squeue; sends TERM to the script of any other job. Raises AwayError
+    if the controller does not answer.
 
-    The state is not an argument of scancel: with ``--state=PENDING`` and one task of a job array, scancel ends all
-    pending tasks of the array.
+    The option ``--state=PENDING`` of scancel is not used: for one task of a job array it ends all pending tasks of the
+    array.
     """
     if entry.state in PENDING:
         cancel(place, entry.job)
@@ -204,15 +206,15 @@ def notify(place: str, entry: Entry) -> None:
 
 
 def kill(place: str, job: str) -> None:
-    """Ends a job immediately. Raises AwayError if the controller does not answer."""
+    """Ends a job at once. Raises AwayError if the controller does not answer."""
     with suppress(RefusedError):
         call(place, ["scancel", "--full", "--signal=KILL", job])
     cancel(place, job)
 
 
 def release(place: str, job: str) -> None:
-    """Releases a held job. Raises AwayError if the controller does not answer; a job that is not held, or has ended, is
-    no error.
+    """Releases a job that Slurm holds. Raises AwayError if the controller does not answer. A job that is not held or
+    has ended is no error.
     """
     with suppress(RefusedError):
         call(place, ["scontrol", "release", job])
@@ -224,7 +226,7 @@ def requeue(place: str, job: str) -> None:
 
 
 def held(folder: Path) -> bool:
-    """Whether a rank 0 on any node writes into the run's folder."""
+    """Whether a rank 0, on any node, is writing into the folder of the run."""
     try:
         with open(os.open(folder / layout.LOCK, os.O_RDONLY | os.O_NONBLOCK), "rb") as lock:
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -236,7 +238,7 @@ def held(folder: Path) -> bool:
 
 
 def begun(folder: Path, job: Job) -> str:
-    """Returns the number of the job that has started with this name; empty if no job has started."""
+    """Returns the number of the job with this name that has started; empty if none has started."""
     try:
         return layout.claim(folder, job.name).read_text()
     except FileNotFoundError:

@@ -1,5 +1,5 @@
-"""Warnings about bodies that move at the start and touch nothing before the end, for example after an error of a length
-unit.
+"""Warnings about parts that move at the start but touch nothing before the end of the run, for example because a length
+has a wrong unit.
 """
 
 import math
@@ -15,10 +15,11 @@ Bounds = tuple[Vector, Vector]
 
 
 def strangers(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each moving part that reaches no other part before ``run.end_time``.
+    """Yields a warning for each moving part that can touch no other part and no wall before ``run.end_time``.
 
-    A case gets no warning if it has mesh files, bodies that turn or stretch, or boundaries other than walls and planes
-    of symmetry. A part gets no warning if other parts, which collide before the end, can hit it.
+    A case gives no warning if it has mesh files, parts that rotate or stretch, or boundaries other than planes of
+    symmetry and fixed plane walls. A part gives no warning if parts that collide with each other before the end can hit
+    it afterwards.
     """
     walls = [boundary for boundary in case.boundaries if isinstance(boundary, Wall) and boundary.plain]
     others = [boundary for boundary in case.boundaries if not isinstance(boundary, Symmetry) and boundary not in walls]
@@ -43,8 +44,9 @@ def strangers(case: Case) -> Iterator[Problem]:
 
 
 def _way(case: Case, i: int, times: list[float]) -> float:
-    """Returns the largest distance of part ``i`` at the end, m, after collisions at ``times``. After a collision a part
-    can move with its own speed plus twice the speed of the collision; without a collision the result is minus infinity.
+    """Returns the largest distance that part ``i`` can have moved at the end of the run, m, after collisions at
+    ``times``, s. A collision can give a part its own speed plus twice the speed of the collision. If no collision is
+    before the end, the result is minus infinity.
     """
     own, end = case.parts[i].velocity, case.run.end_time
     speeds = [math.dist(own, each.velocity) for each, when in zip(case.parts, times, strict=True) if when < end]

@@ -1,15 +1,17 @@
-"""Warnings about brittle parts without a law of compressive failure that are compressed beyond their strength.
+"""Warnings about brittle parts that are compressed beyond their strength although their material has no law of
+compressive failure.
 
-A material with ``brittle`` and without ``strength`` breaks in tension only and resists any compression, as
-real material does not. Griffith's criterion (1924) gives the compression from which cracks grow in material of the
-same tensile strength T: (s1 - s3)^2 = 8 T (s1 + s3) for the largest and the smallest pressure, s1 and s3, where
-s1 + 3 s3 > 0. In the plane wave of an impact there is no lateral strain, so that s3 = k s1, k = nu / (1 - nu), and
+A material with the table ``brittle`` and without the table ``strength`` breaks in tension only and resists any
+compression. No real material does this. Griffith's criterion (1924) gives the compression at which cracks grow in a
+material with the tensile strength T: (s1 - s3)^2 = 8 T (s1 + s3), if s1 + 3 s3 > 0; s1 is the largest and s3 the
+smallest principal pressure. The plane wave of an impact has no lateral strain. With Poisson's ratio nu this gives s3 =
+k s1, k = nu / (1 - nu), and
 
     s1 = 8 T (1 + k) / (1 - k)^2
 
-The stress s1 is 20 T for nu = 0.22. Alumina with T = 300 MPa and nu = 0.22 has s1 = 6.0 GPa; its measured Hugoniot
-elastic limit is 6.6 GPa (alumina_995_jh2 in materials.toml). In a bar under uniaxial
-compression, Griffith's criterion is reached at 8 times the tensile strength T.
+For nu = 0.22 the criterion is reached at s1 = 20 T. Example: alumina with T = 300 MPa and nu = 0.22 has s1 = 6.0 GPa;
+its measured Hugoniot elastic limit is 6.6 GPa (alumina_995_jh2 in materials.toml). In a bar under uniaxial compression,
+Griffith's criterion is reached at 8 times the tensile strength T.
 """
 
 import itertools
@@ -30,20 +32,23 @@ CRUSHING = ("mohr_coulomb", "johnson_holmquist")
 
 
 def bears_all(made: Material) -> bool:
-    """Whether the material breaks in tension only and resists any compression."""
+    """Whether the material can break in tension only and resists any compression."""
     return made.brittle is not None and made.strength is None
 
 
 def griffith(made: Material) -> float:
-    """Returns the stress of a plane wave, Pa, from which on compression breaks a material with ``brittle``."""
+    """Returns the stress of a plane wave, Pa, at which a material with the table ``brittle`` reaches Griffith's
+    criterion.
+    """
     assert made.brittle is not None
     k = made.elastic.poisson / (1.0 - made.elastic.poisson)
     return 8.0 * made.brittle.strength * (1.0 + k) / (1.0 - k) ** 2
 
 
 def impact_stresses(case: Case) -> list[float]:
-    """Returns the largest stress, Pa, of the plane wave of an impact in each part. The stress is the impact speed
-    (impact.impact_speeds) times Z1 Z2 / (Z1 + Z2), with the impedances Z1 and Z2 of both parts, or times Z1 for a wall.
+    """Returns, for each part, the largest stress of the plane wave of an impact, Pa. It is the impact speed
+    (impact.impact_speeds) times Z1 Z2 / (Z1 + Z2), where Z1 and Z2 are the impedances of the part and of the part that
+    it hits; for a wall it is the impact speed times Z1.
     """
     bounds = [velocities(case, part) for part in case.parts]
     weights = [_impedance(material(case, part.material)) for part in case.parts]
@@ -57,16 +62,16 @@ def impact_stresses(case: Case) -> list[float]:
 
 
 def _impedance(made: Material) -> float:
-    """Impedance of plane waves, kg/m^2/s: density times wave speed; for a material that yields, the wave speed is the
-    bulk wave speed.
+    """Impedance of plane waves, kg/m^2/s: density times wave speed. For a material that yields, the wave speed is the
+    bulk sound speed.
     """
     flows = made.strength is not None and made.brittle is None
     return made.density * (math.sqrt(made.bulk / made.density) if flows else wave_speed(made))
 
 
 def crushed(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each material that fails in tension only and can be compressed beyond Griffith's criterion.
-    The warning names the part with the largest compression.
+    """Yields a warning for each material that breaks in tension only and can be compressed beyond Griffith's criterion
+    in the case. The warning names the part with the largest compression.
     """
     most: dict[str, tuple[float, int]] = {}
     for i, (part, stress) in enumerate(zip(case.parts, impact_stresses(case), strict=True)):
@@ -89,7 +94,7 @@ def crushed(case: Case) -> Iterator[Problem]:
 
 
 def borne(found: Sequence[Compressed]) -> list[str]:
-    """Yields a warning for each part that a run has compressed beyond Griffith's criterion."""
+    """Yields a warning for each part that was compressed beyond Griffith's criterion in a run."""
     return [
         f"{each.part} was compressed to {si(each.most, 'Pa')}, with {si(each.least, 'Pa')} across it, "
         f"{each.times:.2g} times the limit for its tensile strength (Griffith 1924), in tet {each.tet} at "
@@ -105,7 +110,7 @@ def _cure() -> str:
 
 
 def _alike(name: str) -> list[str]:
-    """Returns the materials of the library that have a similar name and fail in compression."""
+    """Returns the materials of the library that have a similar name and can fail in compression."""
     return sorted(
         known for known, made in library().items()
         if known.startswith(name.partition("_")[0]) and made.strength is not None and made.strength.model in CRUSHING

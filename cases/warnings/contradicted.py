@@ -1,4 +1,4 @@
-"""Warning about initial velocities that a boundary replaces: the run starts with another motion than the part has."""
+"""Warning about an initial velocity without effect: a boundary prescribes another velocity of the part at the start."""
 
 from collections.abc import Iterator
 
@@ -8,10 +8,10 @@ from ..reading.problems import Problem, problem
 
 
 def contradicted(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each part whose ``velocity`` has a component, other than 0, that a boundary replaces for the
-    whole part at the start.
+    """Yields a warning for each part whose ``velocity`` has a component other than 0 for which a boundary prescribes
+    another value at the start on the whole part.
 
-    A boundary with a box or a set causes no warning, because such a boundary may hold some nodes of a moving part.
+    A boundary with a box or a set gives no warning, because it may intentionally hold some nodes of a moving part.
     """
     for number, drive in case.boundaries_of(Prescribed):
         if drive.low is not None or drive.on is not None:

@@ -1,4 +1,4 @@
-"""The pressure form ``split`` damps elastic motion: the parts of a case that it damps, and the words of the warning."""
+"""Warning about the pressure form ``split``, which damps elastic motion."""
 
 from collections.abc import Iterator
 
@@ -8,8 +8,8 @@ from ..reading.library import material
 from ..reading.problems import Problem, problem
 
 WORDS = "damps elastic motion (a free ball of 6,400 tets loses 15 % of its energy in ten periods)"
-"""Words of the warning; measured in tests/verification/test_pressure_modes.py, explained in docs/theory/elements.md,
-Pressure forms."""
+"""Text of the warning. The loss was measured in tests/verification/test_pressure_modes.py and is explained in
+docs/theory/elements.md, section "Pressure forms"."""
 
 
 def damped(case: Case) -> Iterator[Problem]:

@@ -1,4 +1,4 @@
-"""Warnings about prescribed motion that leads a body through a wall, or through another driven body."""
+"""Warnings about prescribed motions that move a body through a wall, or through another body with prescribed motion."""
 
 import math
 from collections.abc import Iterator
@@ -15,33 +15,32 @@ from ..shapes.loaded import near
 from ..shapes.placed import Placed
 
 _TIMES = 200
-"""Number of times up to the end at which paths are checked; the path of a body then takes a millisecond (reason of the
-chosen value)."""
+"""Number of times up to the end of the run at which the path of a body is checked; one path then takes a millisecond
+(reason of the chosen value)."""
 _MOST = 200
-"""Largest number of driven bodies, and largest number of pairs of driven bodies, that are checked: a second at most
-(chosen values)."""
+"""Largest number of bodies, and of pairs of bodies, that are checked; they take a second at most (chosen values)."""
 _TOUCH = 1e-9
-"""Depth of contact without a warning, divided by the size of a body. The depth is far above rounding errors and far
-below any gap (chosen value)."""
+"""Largest depth of contact without a warning, divided by the size of a body. The depth is far above rounding errors and
+far below any gap (chosen value)."""
 
 
 class Driven(NamedTuple):
-    """A body that a boundary drives."""
+    """A body whose motion a boundary prescribes (drives)."""
 
     number: int
-    """Number of the boundary that drives the body."""
+    """Index of the boundary that drives the body."""
     drive: Prescribed
     part: Part
     mesh: Generated
     ways: list[Vector]
-    """Displacement of the driven nodes of the body at each time, m; components that are not driven continue at the
-    initial velocity."""
+    """Displacement of the driven nodes of the body at each time, m. Components that the boundary does not prescribe
+    continue at the initial velocity."""
 
 
 def passing(case: Case) -> Iterator[Problem]:
     """Yields a warning for each boundary that drives nodes behind a wall, or drives a body into another driven body.
 
-    Rotations, mesh files, and bodies that are turned, rotate or stretch cause no warning.
+    Prescribed rotations, mesh files, and bodies that are turned, rotate or stretch give no warning.
     """
     driven = list(islice(_driven(case), _MOST))
     reported: set[int] = set()
@@ -62,9 +61,7 @@ def _through_walls(case: Case, driven: list[Driven]) -> Iterator[tuple[int, str]
 
 
 def _behind(body: Driven, point: Vector, way: Vector) -> float:
-    """Returns the largest depth of driven nodes behind a wall, m; minus infinity if no driven node is behind the
-    wall.
-    """
+    """Returns the largest depth behind a wall that driven nodes reach, m; minus infinity if none gets behind it."""
     length, drive = math.hypot(*way), body.drive
     normal = way[0] / length, way[1] / length, way[2] / length
     low, high = _bounds(body.mesh)
@@ -80,7 +77,9 @@ def _behind(body: Driven, point: Vector, way: Vector) -> float:
 
 
 def _through_bodies(case: Case, driven: list[Driven]) -> Iterator[tuple[int, str]]:
-    """Yields pairs of bodies that collide along an axis on which each body is driven."""
+    """Yields each body that collides with another one, along an axis along which both are driven: the index of its
+    boundary, and the text of the warning.
+    """
     if case.contact is None:
         return
     meeting = [each for each in driven if not case.contact.parts or each.part.name in case.contact.parts]
@@ -98,7 +97,7 @@ def _through_bodies(case: Case, driven: list[Driven]) -> Iterator[tuple[int, str
 
 
 def _enter(one: tuple[Vector, Vector], other: tuple[Vector, Vector], way: Vector, its: Vector, axes: set[int]) -> bool:
-    """Whether boxes that were separate along one of the ``axes`` overlap on their paths."""
+    """Whether two boxes that are separate along one of the ``axes`` at the start overlap on their paths."""
     (low, high), (low2, high2) = one, other
     margin = _TOUCH * max(b - a for a, b in zip(low + low2, high + high2, strict=True))
     apart = any(min(high[d], high2[d]) - max(low[d], low2[d]) <= margin for d in axes)
@@ -142,7 +141,7 @@ def _way(drives: list[Prescribed], direction: int, time: float, speed: float) ->
 
 
 def _integral(course: Course, time: float) -> float:
-    """Returns the integral of the factor of a course from 0 to a time, s."""
+    """Returns the integral of the factor of a course from time 0 to ``time``, s."""
     if not course:
         return time
     times = sorted({0.0, time, *(t for t, _ in course if 0.0 < t < time)})

@@ -1,4 +1,4 @@
-"""Boundaries without effect, which are found before there is a mesh."""
+"""Errors and warnings about boundaries without effect, found before there is a mesh."""
 
 from collections.abc import Iterator
 
@@ -12,8 +12,8 @@ from ..shapes.region import Region
 
 
 def idle(case: Case, number: int) -> Iterator[Problem]:
-    """Yields an error for a boundary whose box contains no node, or no face, of structured blocks that are not
-    turned.
+    """Yields an error for a boundary whose box contains no node (or no face, for a traction) of structured blocks that
+    are not turned.
     """
     spec = case.boundaries[number]
     assert isinstance(spec, Prescribed | Traction)
@@ -24,7 +24,7 @@ def idle(case: Case, number: int) -> Iterator[Problem]:
 
 
 def _empty(part: Part, spec: Traction | Prescribed) -> bool:
-    """Whether a boundary certainly has no effect on a part in the box of the boundary."""
+    """Whether it is certain that the box of a boundary contains no node or face of a part."""
     if isinstance(part.mesh, Measured):
         return False
     body, region = Placed(part.mesh, part.turn), Region.of(spec)
@@ -35,7 +35,7 @@ def _empty(part: Part, spec: Traction | Prescribed) -> bool:
 
 
 def unloaded(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each boundary whose region seems to contain no face or node."""
+    """Yields a warning for each boundary whose region probably contains no face or node."""
     for load in loads(case):
         if load.faces == 0 or load.nodes == 0:
             what = "face" if load.faces == 0 else "node"

@@ -1,4 +1,6 @@
-"""Warnings about loads and motions across a plane of symmetry: the mirror image has the opposite loads and motions."""
+"""Warnings about loads and motions that contradict a plane of symmetry: on the other side of the plane they would have
+the opposite direction.
+"""
 
 from collections.abc import Iterator
 
@@ -12,10 +14,11 @@ from ..shapes.region import GENERATED
 
 
 def mirrored(case: Case) -> Iterator[Problem]:
-    """Yields a warning for gravity with a component normal to a plane of symmetry, and for a velocity or a spin that
-    moves nodes off the plane.
+    """Yields a warning for gravity with a component normal to a plane of symmetry, and for an initial velocity or spin
+    that moves nodes off the plane.
 
-    Motion of the parts is checked only for generated bodies that are not turned and whose bounds lie on the plane.
+    The motion of a part is checked only if its mesh is generated, it is not turned, and one side of its bounds lies on
+    the plane.
     """
     for number, plane in case.boundaries_of(Symmetry):
         d = index(plane.axis)
@@ -33,7 +36,7 @@ def _share(plane: Symmetry, gravity: Gravity) -> bool:
 
 
 def _ends_on(part: Part, plane: Symmetry, d: int) -> bool:
-    """Whether the plane of symmetry is a side of the bounds of a part."""
+    """Whether the plane of symmetry is a side of the bounds of the part."""
     if isinstance(part.mesh, Measured | Loose) or part.turn is not None:
         return False
     low, high = (corner[d] for corner in Placed(part.mesh).bounds())

@@ -1,5 +1,5 @@
-"""Warnings about a valid case: numbers without a unit, and values outside of the usual range, which may be caused by a
-wrong unit.
+"""Warnings about a valid case that may contain a wrong unit: numbers without a unit, and values outside of the usual
+range.
 """
 
 import math
@@ -29,11 +29,11 @@ from .stiff import stiff
 from .unused import unused
 
 DAY = 86_400.0
-"""Core time above which a warning is given: a day, in core seconds (chosen value)."""
+"""Core time of a run above which it gives a warning: a day, s (chosen value)."""
 FEW_STEPS = 10
-"""Smallest number of time steps without a warning (chosen value). A wave crosses a tet in about two steps; a run that
-ends before a wave has crossed five tets has no result. The usual cause of too few time steps is a wrong unit of a mesh
-file."""
+"""Smallest number of time steps of a run without a warning (chosen value). A wave crosses a tet in about two time
+steps. If the run ends before a wave has crossed five tets, it has no useful result. The usual cause is a wrong unit of
+a mesh file."""
 LIKELY: dict[str, tuple[float, float, str]] = {
     "density": (10.0, 23_000.0, "kg/m^3: foams have 10, osmium has 22,590"),
     "wave speed": (20.0, 20_000.0, "m/s: soft rubber has 30, diamond has 18,000"),
@@ -45,22 +45,23 @@ LIKELY: dict[str, tuple[float, float, str]] = {
     "extent": (1e-6, 5.0, "m: a mesh in mm that was read as m is a thousand times too large"),
     "bulk modulus, density c0^2, over that of elastic,": (0.5, 2.0, "both are of one solid at rest"),
 }
-"""Usual ranges of quantities of solids. The ends of the usual ranges are near the values of known materials
-(handbooks)."""
+"""Usual ranges of the properties of solids: smallest value, largest value, and known materials near these values (from
+handbooks)."""
 SHOCKING = 0.1
-"""Fraction of the wave speed; an impact at a higher speed on a material with linear pressure gives a warning. At this
-speed of an impact between two bodies of the same material, u = v / 2, the pressure is some 7 % too low, and 13 % if the
-other body does not yield. A shock has p = density (c0 + s u) u, with s near 1.5 for metals (1.2 to 1.9 in
-materials.toml); the linear pressure -K ln J gives density (c0 + u / 4) u."""
+"""Impact speed divided by the wave speed above which a material with linear pressure gives a warning. In an impact
+between two bodies of the same material the particle speed is u = v / 2. At this limit the linear pressure is then some
+7 % too low, and 13 % too low if the other body does not yield. The pressure of a shock is p = density (c0 + s u) u,
+where s is near 1.5 for metals (1.2 to 1.9 in materials.toml). The linear pressure -K ln J gives p = density (c0 + u /
+4) u."""
 STIFFENING, LINEAR_STIFFENING = 1.5, 0.25
-"""Slope of the shock speed over the particle speed u: the slope s of metals, and the slope of the linear pressure."""
+"""Increase of the shock speed per particle speed u: the slope s of metals, and the slope of the linear pressure."""
 _UNLIKE = 1000.0
-"""Largest ratio of the sizes of two parts without a warning; finds a length in millimetres that was read as metres
-(reason of the chosen value)."""
+"""Largest ratio of the sizes of two parts without a warning. The limit finds a length in millimetres that was read as
+metres (reason of the chosen value)."""
 
 
 def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Problem]:
-    """Yields every warning: ``data`` is the case as it was written, ``expected`` is the estimate of the case."""
+    """Yields every warning. ``data``: the case as it was written; ``expected``: the estimate of the case."""
     return [*bare_numbers(data), *oddities(case, expected)]
 
 
@@ -90,7 +91,9 @@ def oddities(case: Case, expected: Estimate) -> list[Problem]:
 
 
 def bare_numbers(data: Mapping[str, Any]) -> list[Problem]:
-    """Yields a warning for each key with numbers other than 0 that have no unit; the warning gives the assumed unit."""
+    """Yields a warning for each key that has a number other than 0 without a unit. The warning gives the unit that is
+    assumed.
+    """
     whole = shipped_schema()
     return list(_bare((), data, whole, whole, data))
 
@@ -110,7 +113,7 @@ def _bare(location: Location, value: Any, schema: Schema, whole: Schema, data: M
 
 
 def _is(schema: Schema, value: Mapping[str, Any]) -> bool:
-    """Whether a table is of the variant that a schema describes."""
+    """Whether a table of the case is the variant that the schema describes."""
     consts = {key: each["const"] for key, each in schema["properties"].items() if "const" in each}
     return all(value.get(key) == const for key, const in consts.items())
 
@@ -130,7 +133,7 @@ def _taken(location: Location, value: Any, schema: Schema, data: Mapping[str, An
 
 
 def _bare_number(value: Any) -> bool:
-    """Whether a value is a number other than 0 without a unit; the number may be a text."""
+    """Whether a value is a number other than 0 without a unit, as number or as text."""
     try:
         return not isinstance(value, bool) and float(value) != 0.0
     except (TypeError, ValueError):
@@ -212,8 +215,8 @@ def _bodies(case: Case, expected: Estimate) -> Iterator[Problem]:
 
 
 def _shocks(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each material that is hit too fast for its linear pressure; the warning names the part that
-    is hit fastest.
+    """Yields a warning for each material with linear pressure that an impact hits too fast. The warning names the part
+    that is hit at the highest speed.
     """
     met: dict[str, tuple[float, int]] = {}
     for i, (part, speed) in enumerate(zip(case.parts, impact_speeds(case), strict=True)):

@@ -1,5 +1,5 @@
-"""Warnings about planes of symmetry inside of a body and about probe boxes smaller than a tet, which are valid but
-rarely intended.
+"""Warnings about valid but unusual positions: planes of symmetry inside a body, and boxes of probes that are smaller
+than a tet.
 """
 
 import math
@@ -14,16 +14,16 @@ from ..shapes.geometry import index, volume
 from ..shapes.placed import Placed
 
 _TOUCH = 1e-9
-"""Largest depth of a plane that counts as on the surface, divided by the size of a body. The depth is far above
-rounding errors and far below any tet (chosen value)."""
+"""Largest depth of a plane below the surface of a body at which it counts as on the surface, divided by the size of the
+body. The depth is far above rounding errors and far below any tet (chosen value)."""
 _FEWEST = 1.0
-"""Smallest number of tets that the box of a probe should contain, by its volume; a smaller box may contain no tet of
+"""Number of tets that the box of a probe should contain at least, by its volume. A smaller box may contain no tet in
 some meshes (reason of the chosen value)."""
 
 
 def cut_bodies(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each plane of symmetry that passes through a body with both sides modelled. Turned bodies
-    cause no warning, because only their bounding box is known.
+    """Yields a warning for each plane of symmetry that passes through a body, so that both sides of the plane are
+    modelled. Turned bodies give no warning, because only their bounding box is known.
     """
     for number, plane in case.boundaries_of(Symmetry):
         d = index(plane.axis)
@@ -41,9 +41,7 @@ def cut_bodies(case: Case) -> Iterator[Problem]:
 
 
 def scant_probes(case: Case, expected: Estimate) -> Iterator[Problem]:
-    """Yields a warning for each probe whose box is smaller than a tet; mesh files and graded meshes cause no
-    warning.
-    """
+    """Yields a warning for each probe whose box is smaller than a tet. Mesh files and graded meshes give no warning."""
     sizes = {part.name: (part, size) for part, size in zip(case.parts, expected.parts, strict=True)}
     for i, probe in enumerate(case.probes):
         if not probe.part:

@@ -1,6 +1,4 @@
-"""Warnings about parts that could be rigid, because their deformation absorbs a small part of the energy of an
-impact.
-"""
+"""Notes on parts that could be rigid, because their deformation takes only a small part of the energy of an impact."""
 
 import math
 from collections.abc import Iterator
@@ -13,14 +11,14 @@ from ..reading.problems import Problem, problem
 from .compression import impact_stresses
 
 STIFF = 20.0
-"""Ratio of the impedance of a part to that of all other parts, above which a note is given (chosen value). Two bodies
-absorb the energy of an impact in inverse proportion to their impedances; at the chosen ratio the stiffer body absorbs 5
-%."""
+"""Ratio of the impedance (density times wave speed) of a part to that of every other part, above which the part gives a
+note (chosen value). Two bodies in an impact absorb energy in inverse proportion to their impedances. At this ratio the
+stiffer body absorbs 5 %."""
 
 
 def stiff(case: Case, expected: Estimate) -> Iterator[Problem]:
-    """Yields a warning for each part that could be rigid, with the saving; parts that yield, break or erode cause no
-    warning.
+    """Yields a note for each part that could be rigid, with the saving. Parts that can yield, break or erode give no
+    note.
     """
     if case.contact is None or len(case.parts) < 2:
         return
@@ -37,7 +35,7 @@ def stiff(case: Case, expected: Estimate) -> Iterator[Problem]:
 
 
 def _saves(i: int, expected: Estimate) -> str:
-    """Returns the words for the time that a rigid part saves."""
+    """Returns the words for the tets and the time steps that are saved if part ``i`` is rigid."""
     mine, others = expected.parts[i], [part.dt for j, part in enumerate(expected.parts) if j != i]
     tets = f"{100.0 * mine.elements / expected.elements:.0f} %" if mine.elements and expected.elements else "a share"
     gain = f"would save {tets} of the tets"

@@ -1,4 +1,4 @@
-"""Warnings about bodies whose surfaces coincide at the start: parts without a bond are not joined."""
+"""Warnings about bodies whose surfaces touch at the start: without a bond the two parts are not joined."""
 
 import itertools
 import math
@@ -16,19 +16,21 @@ from ..shapes.placed import Placed
 from ..shapes.sheets import sheets
 
 NEAR = 1e-6
-"""Largest distance of coincident faces, divided by the size of a body: far above rounding errors and below any gap
-(chosen value)."""
+"""Largest distance of faces that count as touching, divided by the size of a body: far above rounding errors and below
+any gap of a model (chosen value)."""
 _FINEST = 40
-"""Largest number of patches along a side of a surface: a tenth of a second for a body (chosen value)."""
+"""Largest number of patches along a side of a surface; a body then takes a tenth of a second (chosen value)."""
 _PAIRS = 32
-"""Largest number of pairs of bodies that are checked: one or two seconds at most (chosen value)."""
+"""Largest number of pairs of bodies that are checked; they take one or two seconds at most (chosen value)."""
 _LEAST = 1e-3
-"""Smallest touching area divided by the surface of the smaller body (chosen value). A smaller touching area is an edge
-or a corner, found because of rounding."""
+"""Smallest touching area, divided by the surface of the smaller body, that gives a warning (chosen value). A smaller
+area is an edge or a corner that rounding makes an area."""
 
 
 class Touch(msgspec.Struct, kw_only=True, frozen=True):
-    """Two parts, given by index, that touch over about ``area``, m^2."""
+    """Two touching parts, given by their indices in the case, and the approximate ``area``, m^2, over which they
+    touch.
+    """
 
     one: int
     other: int
@@ -36,7 +38,7 @@ class Touch(msgspec.Struct, kw_only=True, frozen=True):
 
 
 def touching(case: Case) -> list[Touch]:
-    """Returns the pairs of generated bodies that touch and have no bond; single tets and mesh files are left out."""
+    """Returns the pairs of generated bodies that touch and have no bond. Single tets and mesh files are not checked."""
     bodies = [
         (i, Placed(part.mesh, part.turn))
         for i, part in enumerate(case.parts)
@@ -48,13 +50,15 @@ def touching(case: Case) -> list[Touch]:
 
 
 def bonded(case: Case, one: int, other: int) -> bool:
-    """Whether two parts, by index, have a bond."""
+    """Whether the two parts with the given indices have a bond."""
     names = {case.parts[one].name, case.parts[other].name}
     return any(set(bond.parts) == names for bond in case.bond)
 
 
 def apart(case: Case, touches: Iterable[Touch]) -> Iterator[Problem]:
-    """Yields a warning for two parts that touch but have no contact: no force acts between the two parts."""
+    """Yields a warning for each pair of parts that touch but have neither contact nor bond, so that no force acts
+    between them.
+    """
     for touch in touches:
         names = [case.parts[i].name for i in (touch.one, touch.other)]
         if case.contact is not None and (not case.contact.parts or set(names) <= set(case.contact.parts)):
@@ -82,7 +86,7 @@ def _reach(one: Placed, other: Placed) -> bool:
 
 
 def _common(one: Placed, other: Placed) -> float:
-    """Returns the area, m^2, of the first body's surface that lies on the surface of the second body, summed over
+    """Returns the area, m^2, of the surface of the first body that lies on the surface of the second body, summed over
     patches as large as elements.
     """
     margin = NEAR * min(size(one), size(other))
@@ -104,8 +108,8 @@ def _common(one: Placed, other: Placed) -> float:
 
 
 def _ends(one: Placed, other: Placed, point: Vector, normal: Vector, step: float) -> bool:
-    """Whether the second body begins at the surface of the first body; ``step``: small distance along the normal from a
-    point.
+    """Whether the surface of the second body passes through ``point`` of the surface of the first body. ``step``: small
+    distance along the normal at which points on both sides are tested.
     """
     for sign in (-1.0, 1.0):
         own = _moved(point, normal, -sign * step)

@@ -1,4 +1,4 @@
-"""Notes on parts of a finished run that could have been rigid: they stayed elastic, with little strain and energy."""
+"""Notes on parts of a finished run that could be rigid: they stayed elastic, with small strain and small energy."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -8,29 +8,31 @@ from ..model.rigid import Rigid
 from ..model.schema import Case
 
 STRAIN = 1e-3
-"""Largest strain of a part that could be rigid: half of the yield strain of a hard steel (chosen value). At this strain
-the surface of the part moves by a thousandth of the size of the part, a motion that a rigid part would not have."""
+"""Largest strain of a part that could be rigid: half of the yield strain of a hard steel (chosen value). The surface of
+a part with this strain moves by a thousandth of the size of the part; if the part were rigid, this motion would be
+missing."""
 SHARE = 0.05
-"""Largest fraction of the energies of all parts that a part which could be rigid may have. The value equals the
-fraction of the stiffer of two bodies with an impedance ratio of stiff.STIFF (chosen value)."""
+"""Largest energy of a part that could be rigid, divided by the sum of the energies of all parts. In an impact, the
+stiffer of two bodies has this fraction of the energy at the ratio STIFF of their impedances (module ``stiff``; chosen
+value)."""
 
 
 @dataclass(frozen=True)
 class Strained:
-    """Largest strain and energy of a part in a run."""
+    """Largest strain and largest energy of a part during a run."""
 
     elements: int
     strain: float
-    """Upper bound of the root mean square of the strain: sqrt(2 U / (E V)) with the largest energy U in the tets of the
-    part."""
+    """Upper bound of the root mean square of the strain: sqrt(2 U / (E V)), with the largest energy U of the part,
+    Young's modulus E and the volume V."""
     share: float
-    """Energy of the part divided by the sum of the energies of all parts."""
+    """Largest energy of the part divided by the sum of the energies of all parts."""
     plastic: bool
     """Whether a tet of the part has yielded or was deleted."""
 
 
 def could_be_rigid(case: Case, found: Sequence[Strained], limiter: str) -> Iterator[str]:
-    """Yields a line for each part that could be rigid, with the saving; ``limiter``: what limits the time step."""
+    """Yields a note for each part that could be rigid, with the saving. ``limiter``: what limits the time step."""
     if case.contact is None or len(case.parts) < 2:
         return
     every = sum(part.elements for part in found)

@@ -1,4 +1,4 @@
-"""Warnings about keys without effect, because another key selects another variant."""
+"""Warnings about keys that have no effect because of the value of another key."""
 
 from collections.abc import Iterator
 
@@ -11,11 +11,11 @@ _NEEDS = (
     ("balance", "alpha", "policy", "outside"), ("balance", "every", "policy", "every"),
     ("mesh", "split", "generator", "structured"), ("fracture", "resolution", "resolve", "strength"),
 )  # fmt: skip
-"""Table, key, and another key of the same table with the value that gives the first key an effect."""
+"""Table, key, other key of the table, and the value of the other key with which the first key has an effect."""
 
 
 def unused(case: Case) -> Iterator[Problem]:
-    """Yields a warning for each key that has no effect and a value other than its default."""
+    """Yields a warning for each key that has no effect and whose value is not its default."""
     yield from _idle(case.balance, ("balance",))
     for i, part in enumerate(case.parts):
         yield from _idle(part.mesh, ("parts", i, "mesh"))

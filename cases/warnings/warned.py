@@ -1,4 +1,4 @@
-"""All warnings about a case and its meshes, for ``validate``, the server and the run."""
+"""All warnings about a case and its meshes; ``conoid validate``, the server and the run give them."""
 
 from collections.abc import Iterable
 
@@ -11,9 +11,8 @@ from .touching import Touch, apart
 
 
 def warned(case: Case, expected: Estimate, survey: Survey, touches: Iterable[Touch]) -> list[Problem]:
-    """Returns every warning that does not depend on how the case is written (``plausible.bare_numbers`` gives the
-    others). ``expected``: estimate of the case; ``survey``: survey of its mesh files; ``touches``: pairs of parts whose
-    surfaces coincide.
+    """Returns all warnings except those that depend on how the case is written (``plausible.bare_numbers``).
+    ``expected``: estimate of the case; ``survey``: survey of its mesh files; ``touches``: pairs of parts that touch.
     """
     return [
         *_notes(case, survey),
@@ -24,7 +23,7 @@ def warned(case: Case, expected: Estimate, survey: Survey, touches: Iterable[Tou
 
 
 def _notes(case: Case, survey: Survey) -> list[Problem]:
-    """Yields the notes on contents of the mesh files that are not in the meshes."""
+    """Yields the notes of the survey on contents of mesh files that are not used."""
     return [
         problem(("parts", each.part, "mesh", "path"), getattr(case.parts[each.part].mesh, "path", ...), note)
         for each in survey.parts
