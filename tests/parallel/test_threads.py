@@ -77,6 +77,22 @@ def test_arrays_of_a_table_are_of_its_types() -> None:
             Arguments(*KINDS).set((values, True, np.zeros(1, np.int64)), 1.0, 1)
 
 
+def test_a_table_takes_arrays_of_subclasses_and_of_equal_types() -> None:
+    table, numbers = Arguments(*KINDS), np.array([7, 8])
+    values = np.arange(6.0).reshape(2, 3).view(np.recarray)
+    assert arguments_read(table.set((values, True, numbers), 0.5, -3)) == (5.0, 1.0, 8.0, 0.5, -3.0)
+    assert arguments_read(table.set((values, True, numbers.view(np.longlong)), 0.5, -3)) == (5.0, 1.0, 8.0, 0.5, -3.0)
+    assert arguments_read(table.set((values[:, :].base, True, numbers[:1]), 0.5, -3)) == (5.0, 1.0, 7.0, 0.5, -3.0)
+
+
+def test_a_table_writes_new_arrays_after_a_refused_call() -> None:
+    table, flag = Arguments(*KINDS), True
+    for k in range(50):  # a new array often gets the memory of the array that was freed
+        with pytest.raises(ValueError, match="instead of"):
+            table.set((np.full((2, 3), 100.0 + k), flag, np.zeros((1, 1), np.int64)), 1.0, 1)
+        assert arguments_read(table.set((np.full((2, 3), float(k)), flag, np.array([k])), 1.0, 1))[0] == k
+
+
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_every_task_is_done_once_in_each_of_many_passes(threads: int) -> None:
     done, who = np.zeros(600, np.int64), np.zeros(600, np.int64)

@@ -111,9 +111,9 @@ class Exterior:
         """Marks an edge as sharp if the cosine between the normals of its two faces is below ``least`` (parts,). An
         edge that was sharp once remains sharp.
         """
-        turned = scene.sharpen(least)[: self.surface.edges.n]
-        if turned.any():
-            self.surface.sharpen(np.union1d(self.surface.turned, self.surface.edges.names[turned]))
+        turned = np.flatnonzero(scene.sharpen(least)[: self.surface.edges.n])
+        if len(turned):
+            self.surface.sharpen_at(turned)
 
     def uncover(self, gone: Ints, loose: Flags, removed: Flags, scene: Scene | None) -> bool:
         """Updates mean normals, surface nodes and the ``scene`` after erosion. ``gone`` (k, exposure.WORDS): removed

@@ -7,24 +7,19 @@ its shape. If the layout of the array is not C, ndim further words have its stri
 arrays that a kernel reads from the table have no owner and no reference counts; ``Arguments`` holds references to them.
 """
 
-import ctypes
 from collections.abc import Iterator
-from itertools import compress
-from operator import is_not
 from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
 
 from ..kernels.jit import intrinsic, packed, several, types
+from .array_words import ALONE, LAST, NUMBER, address_of, write_leaves, write_values
 
 _WORD, _BIT = ir.IntType(64), ir.IntType(1)
 """LLVM types: a word of a table, and a flag."""
-_POINTER: Any = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.py_object, ctypes.c_char_p)(
-    ("PyCapsule_GetPointer", ctypes.pythonapi)
-)
-_DATA = 40
-"""Offset of the data pointer in numpy's PyArrayInterface, bytes."""
+_ARRAY = id(np.ndarray)
+"""Address of the type of arrays."""
 
 
 class Follow(NamedTuple):
@@ -51,23 +46,33 @@ class Arguments:
 
     def __init__(self, *kinds: Any) -> None:
         self._kinds = list(_leaves(several(*kinds)))
-        self._is_array = [isinstance(kind, types.Array) for kind in self._kinds]
-        self._dtypes = [_dtype(kind) if isinstance(kind, types.Array) else None for kind in self._kinds]
-        self._strided = [_is_strided(kind) for kind in self._kinds]
-        self._is_real = [kind == types.float64 for kind in self._kinds]
         leaves = [_words(kind) for kind in self._kinds]
         self._places = np.cumsum([0, *leaves])[:-1].tolist()
-        self._values: list[Any] = []
-        self._begins: list[int] = []
         words = np.zeros(sum(leaves), np.int64)
         self._words = words.data
         self._reals = self._words.cast("B").cast("d")
-        self._kept: list[Any] = [None] * len(leaves)
         self.address = int(words.ctypes.data)
         """Address of the table, which kernels take as argument."""
+        self._leaves = np.array([self._leaf(k, kind) for k, kind in enumerate(self._kinds)], np.int64)
+        self._leaves_at = int(self._leaves.ctypes.data)
+        self._kept: list[Any] = [None] * len(leaves)
+        """Leaves of the table that ``put`` has written; the references keep their memory."""
+        self._values: tuple[Any, ...] = ()
+        """Values of the last call of ``set``."""
+        self._sizes, self._sizes_at = np.zeros(0, np.int64), 0
+        self._all_numbers = [k for k, kind in enumerate(self._kinds) if not isinstance(kind, types.Array)]
+        self._numbers: list[tuple[int, int, int]] = []
+        """Numbers and flags among the values of ``set``: number of the leaf; number of the value; number of the field,
+        -1 if the value is no record."""
+
+    def _leaf(self, k: int, kind: Any) -> tuple[int, ...]:
+        """Return the description of leaf number ``k``; see array_words.py."""
+        if not isinstance(kind, types.Array):
+            return self.place(k), NUMBER, 0, 0, 0
+        return self.place(k), kind.ndim, int(_is_strided(kind)), id(_dtype(kind)), 0
 
     def set(self, *values: Any) -> int:
-        """Write the arguments into the table and return its address. Arguments that are already in the table are not
+        """Write the arguments into the table and return its address. Arrays that are already in the table are not
         written again.
 
         Records are tuples, and must be at the same positions in every call. Raises ValueError if an array has another
@@ -75,32 +80,42 @@ class Arguments:
         order.
         """
         if len(values) != len(self._values):
-            sizes = [len(value) if isinstance(value, tuple) else 1 for value in values]
-            self._begins, self._values = np.cumsum([0, *sizes])[:-1].tolist(), [None] * len(values)
-        kept, is_real, reals, places = self._kept, self._is_real, self._reals, self._places
-        for k, value in compress(zip(self._begins, values, strict=True), map(is_not, values, self._values)):
-            if isinstance(value, tuple):
-                for at, leaf in enumerate(value, k):
-                    if leaf is not kept[at]:
-                        self._put(at, leaf)
-                        kept[at] = leaf
-            elif is_real[k]:
-                reals[places[k]] = value
-            else:
-                self._put(k, value)
-        self._values[:] = values
+            self._divide(values)
+        if not write_values(self._leaves_at, self._sizes_at, id(values), len(values), _ARRAY):
+            self._write_all(values)
+        for k, of, field in self._numbers:
+            self._put_number(k, values[of] if field < 0 else values[of][field])
+        self._values = values
         return self.address
+
+    def _divide(self, values: tuple[Any, ...]) -> None:
+        """Divide the leaves of the table among the ``values`` of ``set``."""
+        sizes = [len(value) if isinstance(value, tuple) else ALONE for value in values]
+        self._sizes = np.array(sizes, np.int64)
+        self._sizes_at = int(self._sizes.ctypes.data)
+        fields = [(of, field) for of, size in enumerate(sizes) for field in (range(size) if size >= 0 else (-1,))]
+        self._numbers = [(k, *at) for k, at in enumerate(fields) if not isinstance(self._kinds[k], types.Array)]
+
+    def _write_all(self, values: tuple[Any, ...]) -> None:
+        """Write all arrays by numpy's functions. ``set`` calls this method if an array is of a subclass, or of a type
+        that equals the declared one without being the same object; the method raises ValueError if the type differs.
+        """
+        self._leaves[:, LAST] = 0
+        leaves = [leaf for value in values for leaf in (value if isinstance(value, tuple) else (value,))]
+        for k, leaf in enumerate(leaves):
+            if k not in self._all_numbers:
+                self._put(k, leaf)
 
     def bind(self, *values: Any) -> tuple[int, tuple[Tie, ...]]:
         """Write the arguments as ``set`` does, but some of the numbers are ``Follow``. Return the address of the table,
         and the words that the program writes; the next ``set`` writes these words again.
         """
         address = self.set(*(0.0 if isinstance(value, Follow) else value for value in values))
-        ties = []
-        for k, value in enumerate(values):
-            if isinstance(value, Follow):
-                self._values[k] = None
-                ties.append(Tie(*value, address + 8 * self._places[self._begins[k]]))
+        begins = np.cumsum([0, *np.abs(self._sizes)]).tolist()
+        ties = [
+            Tie(*value, self.place(begin)) for begin, value in zip(begins, values, strict=False)
+            if isinstance(value, Follow)
+        ]  # fmt: skip
         return address, tuple(ties)
 
     def place(self, k: int) -> int:
@@ -108,33 +123,39 @@ class Arguments:
         return int(self.address + self._words.itemsize * self._places[k])
 
     def put(self, first: int, leaves: tuple[Any, ...]) -> None:
-        """Write the leaves (arrays, numbers and flags) from number ``first`` on. Leaves that are already in the table
+        """Write the leaves (arrays, numbers and flags) from number ``first`` on. Arrays that are already in the table
         are not written again.
         """
-        end, kept = first + len(leaves), self._kept
-        for k, value in compress(enumerate(leaves, first), map(is_not, leaves, kept[first:end])):
-            self._put(k, value)
-        kept[first:end] = leaves
+        end = first + len(leaves)
+        if not write_leaves(self._leaves_at, id(leaves), first, len(leaves), _ARRAY):
+            self._leaves[first:end, LAST] = 0
+            for k, leaf in enumerate(leaves, first):
+                if k not in self._all_numbers:
+                    self._put(k, leaf)
+        for k in self._all_numbers:
+            if first <= k < end:
+                self._put_number(k, leaves[k - first])
+        self._kept[first:end] = leaves
+
+    def _put_number(self, k: int, value: Any) -> None:
+        if self._kinds[k] == types.float64:
+            self._reals[self._places[k]] = value
+        else:
+            self._words[self._places[k]] = int(value)
 
     def _put(self, k: int, value: Any) -> None:
-        at = self._places[k]
-        if self._is_array[k]:
-            kind, strided, words = self._kinds[k], self._strided[k], self._words
-            if not (strided or value.flags.c_contiguous):
-                raise ValueError("an array of a table must be in C order")
-            if value.ndim != kind.ndim or value.dtype != self._dtypes[k]:
-                raise ValueError(f"an array of a table is {value.dtype} with {value.ndim} axes instead of {kind}")
-            words[at] = address_of(value)
-            for length in value.shape:
-                at += 1
-                words[at] = length
-            for step in value.strides if strided else ():
-                at += 1
-                words[at] = step
-        elif self._is_real[k]:
-            self._reals[at] = value
-        else:
-            self._words[at] = int(value)
+        """Write an array by numpy's functions. The description of its leaf does not change, so the next call writes the
+        array again.
+        """
+        kind, at = self._kinds[k], self._places[k]
+        strided = _is_strided(kind)
+        if not (strided or value.flags.c_contiguous):
+            raise ValueError("an array of a table must be in C order")
+        if value.ndim != kind.ndim or value.dtype != _dtype(kind):
+            raise ValueError(f"an array of a table is {value.dtype} with {value.ndim} axes instead of {kind}")
+        for word in (address_of(value), *value.shape, *(value.strides if strided else ())):
+            self._words[at] = word
+            at += 1
 
 
 class Handle:
@@ -157,14 +178,6 @@ class Handle:
 
 def _dtype(kind: Any) -> np.dtype[Any]:
     return np.dtype(str(kind.dtype).replace("boolean", "bool"))
-
-
-def address_of(array: Any) -> int:
-    """Return the address of the first item of an array.
-
-    The result is that of ``array.ctypes.data``. numpy's array interface for C gives it in half the time.
-    """
-    return int(ctypes.c_int64.from_address(_POINTER(array.__array_struct__, None) + _DATA).value)
 
 
 def _leaves(kind: Any) -> Iterator[Any]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..kernels.jit import Kernel, njit
 from ..model.state import Ints
-from .arguments import address_of
+from .array_words import address_of
 from .team import CLOCK, END, KERNEL, MOST, SIZE, TABLE, WITHIN, Stage, Team, divide, share
 from .words import call_task, now, word_at
 

@@ -56,6 +56,14 @@ def _read(_: Any, address: Any, k: Any) -> Any:
     return types.int64(address, k), emit
 
 
+def _set(_: Any, address: Any, k: Any, number: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        builder.store(args[2], builder.gep(builder.inttoptr(args[0], _WORD.as_pointer()), [args[1]]))
+        return context.get_dummy_value()
+
+    return types.void(address, k, number), emit
+
+
 def _write(_: Any, address: Any, number: Any) -> Any:
     def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         builder.store(args[1], builder.inttoptr(args[0], ir.DoubleType().as_pointer()))
@@ -101,6 +109,8 @@ now: Any = intrinsic(_read_clock)
 """Function for kernels; it returns the time, ns, and uses two words at the address ``at`` as temporary memory."""
 word_at: Any = intrinsic(_read)
 """Function for kernels; it returns word number ``k`` at an address."""
+set_word: Any = intrinsic(_set)
+"""Function for kernels; it writes word number ``k`` at an address."""
 write_real: Any = intrinsic(_write)
 """Function for kernels; it writes a float64 to an address."""
 sched_yield: Any = intrinsic(lambda _: _library("sched_yield", types.void()))

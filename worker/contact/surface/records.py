@@ -87,10 +87,15 @@ class Edges(Rows):
 
     @property
     def names(self) -> Ints:
-        """(n,) ids of the two faces of each edge, combined into one number. The number identifies the edge, because two
-        faces have at most one edge in common.
-        """
-        return (self.sides[:, 0] << 32) + self.sides[:, 1]
+        """(n,) name of each edge; see names_of. The names of the edges of a surface are ascending."""
+        return names_of(self.sides)
+
+
+def names_of(sides: Ints) -> Ints:
+    """(n,) ids of the two faces ``sides`` (n, 2) of each edge, combined into one number. The number identifies the
+    edge, because two faces have at most one edge in common.
+    """
+    return np.asarray((sides[:, 0] << 32) + sides[:, 1])
 
 
 @dataclass(frozen=True)

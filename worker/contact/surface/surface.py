@@ -6,7 +6,7 @@ import numpy as np
 
 from ...kernels.jit import njit, types
 from ...mesh.faces import FACES
-from ...model.ids import among
+from ...model.ids import places
 from ...model.state import LAID_BARE, WIDE, Bits, Flags, Indices, Ints, Model
 from ...parallel.arguments import reader
 from ...parallel.comm import Comm
@@ -17,7 +17,7 @@ from ...parallel.tags import Tag
 from ...parallel.team import TASK, Team
 from ..geometry import lowest_height
 from . import sharp
-from .records import CrackSides, Edges, Faces
+from .records import CrackSides, Edges, Faces, names_of
 from .sharp import EdgeFinder
 
 _UNSEEN, _COVERED, _YOUNG, _AGED, _EXPOSED, _BARE = range(6)
@@ -60,10 +60,17 @@ class Surface:
     an edge."""
 
     def sharpen(self, names: Ints) -> None:
-        """Marks the edges with the given ``names``, ascending, as sharp."""
+        """Marks the edges with the ``names``, which are ascending, as edges that have become sharp. Names of edges that
+        are not on this surface are omitted.
+        """
         if len(names):
-            own = self.edges.names
-            self.turned, self.edges.sharp[among(names, own)] = np.intersect1d(own, names), True
+            at = places(self.edges.names, names)
+            self.edges.sharp[at[at >= 0]], self.turned = True, names[at >= 0]
+
+    def sharpen_at(self, rows: Ints) -> None:
+        """Adds the edges ``rows`` to the edges that have become sharp."""
+        self.edges.sharp[rows] = True
+        self.turned = np.union1d(self.turned, names_of(self.edges.sides[rows]))
 
 
 class SurfaceBuilder:
