@@ -19,17 +19,17 @@ class BondAccount:
         self.loss, self.external = np.zeros((2, nodes.n))
         """(nodes,) energy dissipated by the bonds, J, and external work, J: work of prescribed velocities against the
         bonds."""
-        nodes.columns.declare(self, loss=ZERO, external=ZERO)  # a copy of a node starts with zero
+        nodes.columns.declare(self, loss=ZERO, external=ZERO)  # the energies of a copy of a node start with zero
         self.mobility: Floats = np.zeros((0, 3))
         """(nodes, 3) inverse mass for each component, 1/kg, as the sweeps use it; 0 for a component with prescribed
         velocity."""
         self._local: Indices = np.zeros(0, np.int32)
         """(h,) nodes on which the last impulses act."""
         self._total, self._before = np.zeros((0, 3), np.int64), np.zeros((0, 3))
-        """(h, 3) last impulses, quanta, and velocities v(n-1/2) of the nodes on which they act, m/s."""
+        """Two arrays (h, 3) for these nodes: last impulses, quanta, and velocities v(n-1/2), m/s."""
 
     def note(self, v: Floats, local: Indices) -> None:
-        """Adds the second half of the work of the last impulses, and stores v(n-1/2) of the nodes ``local``. This
+        """Adds the second half of the work of the last impulses. Then stores v(n-1/2) of the nodes ``local``. This
         function must be called before the kick.
         """
         self._before = v[self._local]

@@ -25,7 +25,7 @@ from ..kernels.jit import njit, types
 _MOST = 9
 """Length of the arrays of polygon corners. A triangle that is cut by three lines has at most six corners."""
 OPPOSED = -0.5
-"""Largest cosine between the normals of two faces that may be bonded; with the chosen value the normals may differ by
+"""Largest cosine between the normals of two faces that may be bonded. With the chosen value the normals may differ by
 at most 60 degrees from exactly opposed normals."""
 _F1, _F2, _F3, _N2, _I = (
     types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int32[:, ::1], types.int64,
@@ -59,8 +59,8 @@ def _frame(frame, x, face):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F2, _F2, _F2, types.int32[::1], _I), cache=True)
 def _project(flat, frame, x, face, origin):  # type: ignore[no-untyped-def]
-    """Sets ``flat`` to the corners of a face in the ``frame`` of another face, whose first corner is ``origin``. The
-    coordinates of a corner are two in the plane of the other face, and the height above it.
+    """Sets ``flat`` to the corners of a face in the ``frame`` of another face, whose first corner is ``origin``. A
+    corner has three coordinates: two in the plane of the other face, and the height above this plane.
     """
     for k in range(3):
         for a in range(3):
@@ -71,7 +71,7 @@ def _project(flat, frame, x, face, origin):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _F2, types.float64, types.float64), cache=True, error_model="numpy")
 def _shares(shares, flat, p, q):  # type: ignore[no-untyped-def]
-    """Sets ``shares`` to the area coordinates in a triangle of a point of the plane."""
+    """Sets ``shares`` to the area coordinates of a point of the plane in a triangle."""
     e, f = flat[1, 0] - flat[0, 0], flat[1, 1] - flat[0, 1]
     g, h = flat[2, 0] - flat[0, 0], flat[2, 1] - flat[0, 1]
     area, r, s = e * h - f * g, p - flat[0, 0], q - flat[0, 1]
@@ -112,8 +112,8 @@ def common(area, far, own, both, corner, x, slaves, masters, pairs):  # type: ig
     (index in ``masters``), and the integrals over it.
 
     ``area`` (p,): common area, m^2; ``far`` (p, 2): smallest and largest height of the mortar face above the tied face
-    in the common area, m; ``own``, ``both`` (p, 3, 3): the integrals that the drawing of the file defines, m^2;
-    ``corner`` (p, 3, 3): area coordinates of the corners of the tied face in the mortar face.
+    in the common area, m; ``own``, ``both`` (p, 3, 3): the integrals own_ij and both_ij that the top of the file
+    defines, m^2; ``corner`` (p, 3, 3): area coordinates of the corners of the tied face in the mortar face.
 
     1. Frames of both faces; they must have an area and face each other.
     2. Both faces in the frame of the tied one.

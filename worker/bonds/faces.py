@@ -1,4 +1,4 @@
-"""Corner nodes of the faces of a bonded interface, after all separations of nodes so far."""
+"""Corner nodes of the faces of bonded interfaces. The corners are updated after separations of nodes."""
 
 import numpy as np
 
@@ -12,23 +12,21 @@ class Faces:
     """Faces of all bonds on one rank. The name of a face is 4 * global tet id + local face."""
 
     def __init__(self, names: Ints, model: Model) -> None:
-        """``names``: names of the faces, ascending; all ranks have the same names."""
+        """``names``: names of the faces, ascending. All ranks have the same names."""
         self.names, self._model = names, model
         self.corners: Ints = np.full((len(names), 3), -1)
-        """(f, 3) global ids of the corners after the last call of ``follow``; -1 for removed faces. The array is equal
-        on all ranks."""
+        """(f, 3) global ids of the corners at the last call of ``follow``; -1 for removed faces. The array is equal on
+        all ranks."""
         self._block, self._place = np.full((2, len(names)), -1)
 
     def changed(self) -> bool:
-        """Returns True if a face of this rank has been removed, or has other corners than after the last call of
-        ``follow``.
-        """
+        """Returns True if a face of this rank was removed or has new corners since the last call of ``follow``."""
         lost = (self._block >= 0) & ~self._stay()
         here = (self._block >= 0) & ~lost
         return bool(lost.any() or (self._here(here) != self.corners[here]).any())
 
     def follow(self, comm: Comm) -> None:
-        """Updates ``corners`` on all ranks. Collective."""
+        """Updates the array ``corners`` on all ranks. Collective."""
         self._locate(~self._stay())
         here = self._block >= 0
         rows = np.column_stack([np.flatnonzero(here), self._here(here)])
@@ -37,7 +35,7 @@ class Faces:
         self.corners[every[:, 0]] = every[:, 1:]
 
     def here(self, names: Ints) -> Flags:
-        """Returns whether each face belongs to a tet of this rank."""
+        """Returns flags: True for each face of a tet of this rank."""
         return np.asarray(self._block[np.searchsorted(self.names, names)] >= 0)
 
     def of(self, names: Ints) -> Ints:
@@ -45,8 +43,8 @@ class Faces:
         return self.corners[np.searchsorted(self.names, names)]
 
     def _stay(self) -> Flags:
-        """Returns a mask: True for faces whose tets are in the same rows of their blocks as before; False for other
-        faces and for faces of other ranks.
+        """Returns flags of faces. A flag is True if the tet of the face is in the same row of its block as before; it
+        is False for other faces and for faces of other ranks.
         """
         found = np.zeros(len(self.names), bool)
         for b, block in enumerate(self._model.blocks):
@@ -64,7 +62,7 @@ class Faces:
             self._block[rows], self._place[rows] = b, at[found]
 
     def _here(self, some: Flags) -> Ints:
-        """(k, 3) present corners of faces of this rank."""
+        """(k, 3) present corners of faces of this rank, as global ids of nodes."""
         corners = np.empty((len(self.names), 3), np.int64)
         for b, block in enumerate(self._model.blocks):
             rows = np.flatnonzero(some & (self._block == b))

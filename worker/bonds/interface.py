@@ -1,17 +1,16 @@
 """Tied interface at the start: the nodes of one part that are tied to faces of another part, and the weights of the
 ties.
 
-The nodes of the finer surface, the tied side, are tied to faces of the other surface, the mortar side; a rigid part is
-always the mortar side. The velocities
-v_i of the tied side and v_j of the mortar side fulfil
+The nodes of the finer surface, the tied side, are tied to faces of the other surface, the mortar side. A rigid part is
+always the mortar side. The velocities v_i of the tied side and v_j of the mortar side fulfil
 
     D_i v_i = sum_j M_ij v_j,   D_i = int psi_i dA,   M_ij = int psi_i N_j dA,
 
 with the shape functions N of the mortar side, and functions psi that are dual to the shape functions of the tied side
-on every tied face (dual mortar method, Wohlmuth 2000). A constant stress is transmitted exactly, and each of the
-equations contains only one tied node. If the mortar side covers only a part of a tied face, each node of the tied face
-that lies on the mortar side is tied to the mortar point below it (collocation). The weight of such a node is its share
-of the covered area.
+on every tied face (dual mortar method, Wohlmuth 2000). A constant stress is transmitted exactly, and each equation
+contains only one tied node. If the mortar side covers only a part of a tied face, each node of the tied face that lies
+on the mortar side is tied to the mortar point below it (collocation). The weight of such a node is its share of the
+covered area.
 """
 
 from dataclasses import dataclass
@@ -32,10 +31,12 @@ from .pieces import Pieces
 from .rows import assembled
 
 _NEAR = 10.0
-"""Factor of the largest bonded distance; below this distance, nodes that are not tied are counted in a warning."""
+"""Factor of the largest bonded distance. Nodes that are not tied are counted in a warning if their distance is smaller
+than this factor times the largest bonded distance."""
 _COVERED = 0.95
-"""Smallest covered fraction of the area of a tied face at which the face counts as covered; chosen value: between
-curved surfaces, whose faces are not parallel, gaps and overlaps of 1 or 2 % of the area occur."""
+"""Smallest fraction of the area of a tied face that must be covered by the mortar side, so that the face counts as
+covered. Chosen value: between curved surfaces, whose faces are not parallel, gaps and overlaps of 1 or 2 % of the area
+occur."""
 _LEAST = 1e-9
 """Smallest ratio of a common area to the area of the tied face; smaller common areas are ignored."""
 _ON = 1e-6
@@ -79,8 +80,8 @@ def tied_pairs(case: Case) -> list[tuple[int, int, int]]:
 
 
 def find(case: Case, x: Floats, tets: Indices, tet_part: Indices, exposed: Flags) -> Found:
-    """Returns the pieces (common areas of two faces) of all tied bonds; ``exposed`` (tets, 4): which faces are exposed.
-    Raises InputError if a bond ties no node.
+    """Returns the pieces of all tied bonds. A piece is the common area of two faces. ``exposed`` (tets, 4): True for
+    each exposed face. Raises InputError if a bond ties no node.
     """
     found, warnings, x = list[Pieces](), list[str](), x.copy()
     for bond, one, two in tied_pairs(case):
@@ -97,7 +98,7 @@ def find(case: Case, x: Floats, tets: Indices, tet_part: Indices, exposed: Flags
 
 
 def _surface(x: Floats, tets: Indices, exposed: Flags) -> _Faces:
-    """Returns the exposed faces; ``exposed`` (tets, 4): which faces are exposed."""
+    """Returns the exposed faces. ``exposed`` (tets, 4): True for each exposed face."""
     tet, face = np.nonzero(exposed)
     nodes = np.ascontiguousarray(tets[tet[:, None], FACES[face]], np.int32)
     return _Faces(4 * tet + face, nodes, np.sqrt(2.0 * face_areas(x, nodes)))
@@ -106,7 +107,7 @@ def _surface(x: Floats, tets: Indices, exposed: Flags) -> _Faces:
 def _bonded(
     case: Case, bond: int, x: Floats, sides: list[_Faces]
 ) -> tuple[Pieces, list[str]]:  # fmt: skip
-    """Returns the pieces (common areas of two faces) of one bond, and warnings."""
+    """Returns the pieces (common areas of two faces) of one bond, and warnings about the bond."""
     spec = case.bond[bond]
     assert isinstance(spec, TiedBond)
     reach = [_NEAR * (np.full(len(s.size), spec.gap) if spec.gap is not None else GAP * s.size) for s in sides]
@@ -210,8 +211,8 @@ def _dual(own: Floats, lumped: Floats) -> Floats:
 
 
 def _collocate(weights: Floats, cut: _Cut, some: Flags, lumped: Floats) -> None:
-    """Sets the weights on tied faces that are covered in part; the weights of a corner are those in the piece in which
-    the corner lies deepest.
+    """Sets the weights on tied faces that are only partly covered. A corner may lie in several pieces; its weights are
+    those of the piece in which it lies deepest.
     """
     rows = np.flatnonzero(some)
     inside = cut.corner[rows].min(axis=2)

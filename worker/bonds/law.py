@@ -1,12 +1,15 @@
-"""Law of a bond that may break: the traction is limited by an ellipse that shrinks with the opening.
+"""Law of a bond that may break. The traction has the normal part t_n and the shear part t_s. An ellipse that shrinks
+with the opening delta limits the traction. The strengths s_n and s_s are the axes of the ellipse at the start; D is the
+damage.
 
     (<t_n> / s_n)^2 + (|t_s| / s_s)^2 <= (1 - D)^2,   dD = d(delta) / delta_c,   delta_c = 2 G / |T|,
 
 Here T is the traction on the initial ellipse in the present direction. G is the fracture energy per area: 1 / G = (1 -
-B) / G_n + B / G_s, where B is the fraction of the work that is done in shear. The traction therefore decreases linearly
-with the opening delta, and opening in one direction dissipates the energy G. Below the strength the bond does not open.
-An open bond closes without resistance and transmits pressure when it is closed; it transmits tension again at its
-widest opening, so an open bond stores no energy. Sliding is permanent.
+B) / G_n + B / G_s, where B is the fraction of the work that is done in shear, and G_n and G_s are the fracture energies
+in tension and shear. The traction therefore decreases linearly with the opening delta, and opening in one direction
+dissipates the energy G. Below the strength the bond does not open. An open bond closes without resistance, and
+transmits pressure when it is closed. The bond transmits tension again when it reaches its widest opening. Therefore an
+open bond stores no energy. Sliding is permanent.
 """
 
 import numpy as np
@@ -31,16 +34,16 @@ from .records import (
 from .records import NODES as _NODES
 
 _FULL = 1.0 - 1e-6
-"""Ratio of a traction to the size of the ellipse; above this ratio the traction opens the bond."""
+"""Ratio of a traction to the size of the ellipse. A traction with a larger ratio opens the bond."""
 _F, _I = types.float64, types.int64
 _VECTOR = types.UniTuple(_F, 3)  # type: ignore[no-untyped-call]
 
 
 @njit(_VECTOR(_VECTOR, _VECTOR, _VECTOR, _F, _F, _F, _F, _F, _F, _F), cache=True, error_model="numpy")
 def project(push, speed, out, closed, play, step, normal_limit, shear_limit, dt, stiff):  # type: ignore[no-untyped-def]
-    """Returns a new impulse of a tied row: ``push`` minus ``step``, kg, times the relative velocity ``speed``,
-    projected onto the ellipse of the largest impulses across and along the interface. ``out``: outward normal of the
-    tied side.
+    """Returns a new impulse of a tied row. The impulse is ``push`` minus ``step``, kg, times the relative velocity
+    ``speed``, and is then projected onto the ellipse of the largest impulses across and along the interface. ``out``:
+    outward normal of the tied side.
 
     ``closed``: distance by which the bond may close without resistance, m; ``play``: distance by which it may open
     without resistance, m; ``dt``: time step, s; ``stiff``: remaining fraction of the strength.
@@ -75,7 +78,7 @@ def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untype
     """Opens the tied rows from ``first`` to ``stop`` whose traction is at its limit. Returns the number of tied rows
     that have failed.
 
-    ``mean_dt``: time in which the impulses act, s; ``dt``: time step, s.
+    ``mean_dt``: time for which the impulses act, s; ``dt``: time step, s.
 
     1. Relative velocity at the end of the step, stored for the next one.
     2. Tension and shear of the impulse, opening velocity, power.

@@ -3,8 +3,8 @@ the tied nodes that it owns, and has a table of the nodes to which these rows ap
 
 The table contains the nodes of the rows, and all tied and mortar nodes on this rank, because rows of other ranks may
 apply impulses to them. Positions and velocities of nodes of other ranks are copied from their owners. Sums of impulses
-are sent to all ranks that have the node in their table. Every rank has the list of all rows (rows.py); the messages are
-planned once, when the rows change.
+are sent to all ranks that have the node in their table. Every rank has the list of all rows (rows.py). The messages are
+planned only when the rows change.
 """
 
 import math
@@ -21,14 +21,15 @@ from .records import BREAKS, KEPT, NORMAL, STATE, TiedNodes, TiedRows
 from .rows import Rows, chain
 
 _SETTLED = 1e-7
-"""Ratio of the residual of the sweeps of a step to the change of the impulses in the step; chosen value: the energy
-dissipated by the bond is then below 1e-9 of the energy transmitted through the bond (docs/theory/bonds.md)."""
+"""Target of the sweeps of a step: residual of the sweeps divided by the change of the impulses in the step. Chosen
+value: the energy dissipated by the bond is then below 1e-9 of the energy transmitted through the bond
+(docs/theory/bonds.md)."""
 _SLOWEST = 0.02
-"""Smallest value that is used as ratio of the smallest to the largest eigenvalue of the tied rows; it gives 60 sweeps.
-Chosen value: a smallest value is needed because the bound of the ratio is zero for tied nodes with prescribed
-motion."""
+"""Smallest value that is used for the ratio of the smallest to the largest eigenvalue of the tied rows. With this value
+a step has 60 sweeps. Chosen value: a smallest value is needed because the bound of the ratio is zero for tied nodes
+with prescribed motion."""
 _WORDS = 6
-"""Number of words for a node in a message. The words are its position and velocity."""
+"""Number of words for one node in a message: its position and velocity."""
 
 
 @dataclass
@@ -53,9 +54,9 @@ class Layout:
 
 
 def momentum(least: float) -> tuple[float, int]:
-    """Returns the extrapolation factor, and the number of sweeps that reduce the residual to _SETTLED. ``least``: bound
-    of the ratio of the smallest to the largest eigenvalue of the tied rows. With q = sqrt(``least``) the factor is (1 -
-    q) / (1 + q), and a sweep multiplies the residual by 1 - q (Nesterov 2004, 2.2.1).
+    """Returns the extrapolation factor, and the number of sweeps that reduce the relative residual to _SETTLED.
+    ``least``: bound of the ratio of the smallest to the largest eigenvalue of the tied rows. With q = sqrt(``least``)
+    the factor is (1 - q) / (1 + q), and a sweep multiplies the residual by 1 - q (Nesterov 2004, 2.2.1).
     """
     root, sweeps, left = math.sqrt(max(least, _SLOWEST)), 1, 1.0
     while left > _SETTLED:
@@ -103,14 +104,16 @@ def laid_out(
 
 
 def _name(row: Ints) -> Ints:
-    """Returns, for each tied row, the table id of the point of a rigid body to which the row is tied; nodes have ids
-    from 0.
+    """Returns the table id of a point of a rigid body for each tied row that is tied to such a point. Nodes have ids
+    from 0 on.
     """
     return -1 - row
 
 
 def _at_points(rows: Rows, points: Points) -> Rows:
-    """Returns the tied rows after one point of a rigid body has replaced all their mortar nodes."""
+    """Returns the tied rows after the replacement of mortar nodes: one point of a rigid body replaces all mortar nodes
+    of a row.
+    """
     others = ~np.isin(rows.row, points.row)
     row = np.concatenate([rows.row[others], points.row])
     order = np.argsort(row, kind="stable")
@@ -126,7 +129,7 @@ def _norms(
     bound of the l1 norm of each row of this rank, kg; the l1 norm is sum_k |w_k| S_k / m_k, where S_k is the sum of
     |w_k| over all rows.
 
-    The values of a row are 0 if none of its nodes can move; they are also 0 across ``planes`` (r, 3) of symmetry that
+    The values of a row are 0 if none of its nodes can move. They are also 0 across ``planes`` (r, 3) of symmetry that
     contain the tied node, because the mirror image of the mortar side keeps the node on the plane. ``of_bodies`` (r,):
     contribution of rigid bodies to the norms, 1/kg.
     """
@@ -167,9 +170,7 @@ def _rows(rows: Rows, mine: Flags, ids: Ints, inverse: Floats, states: Floats, l
 
 
 def _nodes(rows: TiedRows, ids: Ints, mobility: Floats) -> TiedNodes:
-    """Returns the table of nodes, and the weights of each node in the tied rows: the weight of a mortar node, and NaN
-    for the tied node.
-    """
+    """Returns the table of nodes, and the weights of each node in the tied rows. The weight is NaN for a tied node."""
     n = len(ids)
     of = np.repeat(np.arange(len(rows.node)), np.diff(rows.begin))
     at = np.concatenate([rows.master, rows.node])
@@ -184,7 +185,7 @@ def _nodes(rows: TiedRows, ids: Ints, mobility: Floats) -> TiedNodes:
 
 @dataclass
 class Messages:
-    """Messages between ranks that are sent in every step."""
+    """Messages between ranks for tied bonds; they are sent in every step."""
 
     sums: Exchange
     copies: Exchange
@@ -201,8 +202,8 @@ class Messages:
 
     @classmethod
     def of(cls, ids: Ints, pushed: Flags, local: Indices, nodes: Nodes, comm: Comm) -> "Messages":
-        """Plans the messages for the table ``ids`` of nodes; ``local``: local indices of the nodes. ``pushed``: whether
-        a row of this rank applies an impulse to a node. Collective.
+        """Plans the messages for the table ``ids`` of nodes; ``local``: local indices of the nodes. ``pushed``: True
+        for each node to which a row of this rank applies an impulse. Collective.
         """
         owned = (local >= 0) & nodes.owned[local]
         tables = comm.share((ids, pushed, local >= 0, owned))
@@ -240,7 +241,7 @@ class Messages:
         x[self.takes], v[self.takes] = into[:, :3].copy().view(np.float64), into[:, 3:].copy().view(np.float64)
 
     def complete(self, words: Ints) -> None:
-        """Adds the impulses of rows of other ranks to the sums ``words`` (n, 3)."""
+        """Adds the impulses of the rows of other ranks to the sums ``words`` (n, 3)."""
         self.buffers[0][:] = words[self.sends]
         self.sums.begin()
         self.sums.finish()

@@ -13,8 +13,8 @@ from ..model.state import Flags, Floats, Ints
 
 @dataclass
 class Pieces:
-    """Pieces, sorted by bond, tied face (column ``slave``) and mortar face (column ``master``). The name of a face is 4
-    * global tet id + local face. The corners of a face have the order of mesh/faces.py.
+    """Table of pieces, sorted by bond, tied face (column ``slave``) and mortar face (column ``master``). The name of a
+    face is 4 * global tet id + local face. The corners of a face have the order of mesh/faces.py.
     """
 
     bond: Ints
@@ -27,8 +27,8 @@ class Pieces:
     """(p, 9) weight of each pair of a corner of the tied face and a corner of the mortar face, m^2. The three weights
     of a tied corner are successive."""
     of_face: Ints
-    """(p,) number of pieces of the tied face at the start. A tied face that has lost one of its pieces is no longer
-    tied."""
+    """(p,) number of pieces that the tied face of each piece had at the start. A tied face that has lost one of its
+    pieces is no longer tied."""
 
     @classmethod
     def none(cls) -> Self:
@@ -40,7 +40,7 @@ class Pieces:
         return len(self.bond)
 
     def take(self, chosen: Flags | Ints) -> Self:
-        """Returns the chosen pieces."""
+        """Returns the pieces chosen by ``chosen``."""
         return type(self)(
             self.bond[chosen], self.slave[chosen], self.master[chosen], self.weights[chosen], self.of_face[chosen]
         )

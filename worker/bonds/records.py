@@ -32,7 +32,7 @@ class TiedRows(NamedTuple):
     """(r,) area of the interface that belongs to each row, m^2."""
     inverse: Floats
     """(r, 3) 1 / bound of the l1 norm of each row, for each axis, kg; the value is 0 for an axis that the row does not
-    constrain. In a row that may break, the values of all other axes are equal."""
+    constrain. In a row that may break, the values of the other axes are equal."""
     bond: Indices
     """(r,) index in ``laws`` of the bond of each row."""
     laws: Floats
@@ -65,7 +65,7 @@ class TiedNodes(NamedTuple):
     first: Ints
     """(n + 1,) index of the first entry of each node in ``row`` and ``share``."""
     row: Indices
-    """(m,) number of a row that applies an impulse to the node."""
+    """(m,) number of each row that applies an impulse to the node."""
     share: Floats
     """(m,) weight of the node in this row; NaN for the tied node."""
 

@@ -11,17 +11,17 @@ from ..model.state import Flags, Floats, Ints
 from .pieces import Pieces
 
 _NOTHING = 1e-12
-"""Fraction of the area of a row; smaller weights are treated as round-off."""
+"""Smallest weight of a row, as a fraction of the area of the row. Smaller weights are treated as round-off."""
 
 
 @dataclass
 class Rows:
-    """Tied rows, sorted by bond and node."""
+    """Table of tied rows, sorted by bond and node."""
 
     bond: Ints
-    """(r,) number of the bond."""
+    """(r,) number of the bond of each row."""
     node: Ints
-    """(r,) global id of the tied node."""
+    """(r,) global id of the tied node of each row."""
     area: Floats
     """(r,) area of the interface that belongs to each row, m^2."""
     row: Ints
@@ -29,14 +29,14 @@ class Rows:
     master: Ints
     """(e,) global id of the mortar node of each weight."""
     weight: Floats
-    """(e,) weights; the weights of a row add up to one."""
+    """(e,) weights. The sum of the weights of a row is one."""
     side: Ints
     """(s,) number of the row of each tied face at its node."""
     face: Ints
     """(s, 3) global ids of the corners of each tied face."""
 
     def take(self, chosen: Flags) -> "Rows":
-        """Returns the chosen rows."""
+        """Returns the rows chosen by ``chosen``."""
         again, entries, sides = np.cumsum(chosen) - 1, chosen[self.row], chosen[self.side]
         return Rows(
             self.bond[chosen], self.node[chosen], self.area[chosen], again[self.row[entries]], self.master[entries],
@@ -45,7 +45,8 @@ class Rows:
 
 
 def one_each(rows: Rows, intact: Flags) -> Flags:
-    """(r,) whether each row acts. If a node has several ``intact`` (r,) rows, only the row with the largest area acts.
+    """(r,) True for each row that acts. If a node has several ``intact`` (r,) rows, only the row with the largest area
+    acts.
 
     On a line where three parts are tied to each other, a node has rows of two bonds. One of the rows is sufficient to
     join the parts, and two rows are nearly linearly dependent (docs/theory/bonds.md, "Lines of three parts").
@@ -59,8 +60,9 @@ def one_each(rows: Rows, intact: Flags) -> Flags:
 
 
 def chain(rows: Rows) -> float:
-    """Returns a bound of the spectral norm of the weights of those mortar nodes that are tied nodes of other rows; 0 if
-    there are no such nodes. The bound is sqrt(largest row sum times largest column sum) of the absolute weights.
+    """Returns a bound of a spectral norm. The matrix consists of the weights of those mortar nodes that are also tied
+    nodes of other rows; the result is 0 if there are no such nodes. The bound is sqrt(largest row sum times largest
+    column sum) of the absolute weights.
     """
     among = np.isin(rows.master, rows.node)
     if not among.any():

@@ -49,7 +49,7 @@ class Bonds:
         self.apart = False
         """True if a tied row of this rank has failed in this step."""
         self._mean_dt = 0.0
-        """Time in which the last impulses acted, s."""
+        """Time for which the last impulses acted, s."""
         self._layout: Layout | None = None
         if len(pieces):
             self._rebuild()
@@ -85,7 +85,7 @@ class Bonds:
             layout.rigid.tied(state)
 
     def solve(self, state: Nodes, *, touched: bool) -> None:
-        """Computes the impulses of the tied nodes and changes v(n+1/2). ``touched``: whether velocities have changed
+        """Computes the impulses of the tied nodes and changes v(n+1/2). ``touched``: True if velocities have changed
         since ``predict``. Collective.
         """
         layout, clock = self._laid, self._clock
@@ -163,7 +163,7 @@ class Bonds:
 
 
 class _Passes:
-    """Sweeps over a layout, by the threads of a rank."""
+    """Sweeps over a layout; the threads of a rank share them."""
 
     def __init__(self, team: Team) -> None:
         some = sweeps.TASK_SIZE
@@ -184,7 +184,7 @@ class _Passes:
             self.apply(layout, scale, walls=True)
 
     def apply(self, layout: Layout, scale: float, *, walls: bool) -> None:
-        """Adds the changes of the impulses to the velocities. ``walls``: whether walls stop the rigid bodies.
+        """Adds the changes of the impulses to the velocities. ``walls``: True if walls stop the rigid bodies.
         Collective.
         """
         n = len(layout.nodes.v)

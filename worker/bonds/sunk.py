@@ -1,4 +1,4 @@
-"""Overlap at the start of two parts with a tied bond; contact does not detect this overlap."""
+"""Overlap, at the start, of two parts with a tied bond. Contact does not detect this overlap."""
 
 from collections.abc import Iterator
 
@@ -18,8 +18,8 @@ from .pieces import Pieces
 
 def sunk(case: Case, x: Floats, tets: Indices, tet_part: Indices, exposed: Flags, tied: Pieces) -> Iterator[str]:
     """Yields a warning for each bond whose parts have nodes inside of each other after the ``tied`` nodes have been
-    moved onto the mortar side. ``exposed`` (tets, 4): which faces are exposed. Raises InputError if a node of one part
-    is deeper in the other part than the gap of the bond.
+    moved onto the mortar side. ``exposed`` (tets, 4): True for each exposed face. Raises InputError if a node of one
+    part is deeper in the other part than the gap of the bond.
     """
     for k, one, two in tied_pairs(case):
         spec = case.bond[k]

@@ -34,7 +34,7 @@ from .records import (
 _F1 = types.float64[::1]
 _F, _I, _F2, _I2, _N1 = types.float64, types.int64, types.float64[:, ::1], types.int64[:, ::1], types.int32[::1]
 TASK_SIZE = 256
-"""Number of rows or nodes in a task; chosen value: a task takes about 20 us, compared with 2 us to start a parallel
+"""Number of rows or nodes in a task. Chosen value: a task takes about 20 us, compared with 2 us to start a parallel
 region."""
 ACT = ROWS, NODES, _F, _F, _F, _F
 GIVE = ROWS, NODES, _F
@@ -45,7 +45,7 @@ _act, _give, _move = reader(*ACT), reader(*GIVE), reader(*MOVE)
 @njit(types.void(ROWS, NODES, _F, _F, _F, _F, _I, _I), cache=True, error_model="numpy")
 def act(rows, nodes, ahead, mean_dt, dt, scale, first, stop):  # type: ignore[no-untyped-def]
     """Corrects the impulses of the rows from ``first`` to ``stop``. ``ahead``: extrapolation factor; ``mean_dt``: time
-    in which the impulses act, s; ``dt``: time step, s; ``scale``: quanta per N s.
+    for which the impulses act, s; ``dt``: time step, s; ``scale``: quanta per N s.
     """
     v, state, laws, inverse, change, own = nodes.v, rows.state, rows.laws, rows.inverse, rows.change, rows.own
     node, begin, master, weight = rows.node, rows.begin, rows.master, rows.weight
@@ -78,8 +78,8 @@ def act(rows, nodes, ahead, mean_dt, dt, scale, first, stop):  # type: ignore[no
 
 @njit(types.void(ROWS, NODES, _F, _F, _I, _I), cache=True)
 def resume(rows, nodes, ratio, scale, first, stop):  # type: ignore[no-untyped-def]
-    """Warm start. The rows from ``first`` to ``stop`` start with ``ratio`` times their last impulses, and with the
-    present normals of their faces.
+    """Warm start of the rows from ``first`` to ``stop``. The rows start with ``ratio`` times their last impulses, and
+    with the present normals of their faces.
     """
     state, laws, begin = rows.state, rows.laws, rows.begin
     for r in range(first, stop):
@@ -123,7 +123,9 @@ def move(nodes, scale, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(types.void(ROWS, NODES, _F, _F, _F, _F, _I), cache=True)
 def sweep_all(rows, nodes, ahead, mean_dt, dt, scale, many):  # type: ignore[no-untyped-def]
-    """Runs ``many`` sweeps of all rows. Used if no row of another rank applies impulses to the nodes of this rank."""
+    """Runs ``many`` sweeps of all rows. The function is used if no row of another rank applies impulses to the nodes of
+    this rank.
+    """
     for k in range(many):
         act(rows, nodes, ahead if k + 1 < many else 0.0, mean_dt, dt, scale, 0, len(rows.node))
         give(rows, nodes, scale, 0, len(nodes.v))
@@ -132,21 +134,21 @@ def sweep_all(rows, nodes, ahead, mean_dt, dt, scale, many):  # type: ignore[no-
 
 @njit(TASK, cache=True)
 def act_task(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``act``."""
+    """Task: runs ``act`` for a range of rows."""
     rows, nodes, ahead, mean_dt, dt, scale = _act(table)
     act(rows, nodes, ahead, mean_dt, dt, scale, first, stop)
 
 
 @njit(TASK, cache=True)
 def give_task(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``give``."""
+    """Task: runs ``give`` for a range of nodes."""
     rows, nodes, scale = _give(table)
     give(rows, nodes, scale, first, stop)
 
 
 @njit(TASK, cache=True)
 def move_task(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``move``."""
+    """Task: runs ``move`` for a range of nodes."""
     nodes, scale = _move(table)
     move(nodes, scale, first, stop)
 
@@ -154,8 +156,8 @@ def move_task(table, first, stop, thread):  # type: ignore[no-untyped-def]
 @njit(types.void(_F1, _F1, _N1, _F2, _I2, _F2, _F), cache=True)
 def book(loss, external, local, before, total, mobility, scale):  # type: ignore[no-untyped-def]
     """Adds half of the work of the impulses ``total`` (n, 3) on the nodes ``local`` (n,), computed with the velocities
-    ``before`` (n, 3). The work is energy dissipated by the bonds; where the velocity is prescribed, a part of it is
-    external work.
+    ``before`` (n, 3). The work is energy that the bonds dissipate. If the velocity of a node is prescribed, a part of
+    the work is external work.
     """
     for k in range(len(local)):
         a = local[k]

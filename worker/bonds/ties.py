@@ -13,7 +13,8 @@ from .records import DAMAGE, KEPT, PUSH
 from .rows import Rows, assembled
 
 _BITS = 62
-"""Number of bonds that contact distinguishes by a bit of their own; further bonds share one bit."""
+"""Number of bonds that have a bit of their own, by which contact distinguishes them. All further bonds share one
+bit."""
 Known = tuple[Ints, Ints, Floats]
 """Bonds (r,), nodes (r,) and states (r, KEPT) of tied rows."""
 
@@ -25,7 +26,7 @@ class Ties:
         """``pieces``: pieces of the interface on all ranks."""
         self._model, self._comm = model, comm
         self.version = 0
-        """Number that increases when tied rows change."""
+        """Number that increases by each change of the tied rows."""
         self._set(pieces)
 
     def _set(self, pieces: Pieces) -> None:
@@ -42,7 +43,7 @@ class Ties:
         return int((self.states[:, DAMAGE] < 1.0).sum())
 
     def bits(self, ids: Ints) -> Ints:
-        """(k,) bonds that tie each node, one bit for each bond."""
+        """(k,) bonds that tie each node, as one bit for each bond."""
         at = places(self._tied, ids)
         return np.where(at >= 0, self._bits[at], 0) if len(self._tied) else np.zeros(len(ids), np.int64)
 
@@ -110,7 +111,7 @@ class Ties:
         return states
 
     def _left(self, pieces: Pieces) -> Flags:
-        """Returns whether the tied face of each piece still has all its pieces."""
+        """Returns True for each piece whose tied face still has all its pieces."""
         whole = (self.faces.of(pieces.slave)[:, 0] >= 0) & (self.faces.of(pieces.master)[:, 0] >= 0)
         _, of = np.unique(np.column_stack([pieces.bond, pieces.slave]), axis=0, return_inverse=True)
         of = of.reshape(-1)
@@ -118,8 +119,8 @@ class Ties:
 
 
 def _of(bonds: Ints, nodes: Ints, bond: Ints, node: Ints, states: Floats) -> Floats:
-    """Returns the states of the rows with the given ``bonds`` and ``nodes`` (k,); they are selected from ``states``,
-    whose rows belong to ``bond`` and ``node`` (r,); zero if a row is not found.
+    """Returns the states of the rows with the given ``bonds`` and ``nodes`` (k,); The states are selected from
+    ``states``, whose rows belong to ``bond`` and ``node`` (r,). The state of a row that is not found is zero.
     """
     many = int(max(nodes.max(initial=0), node.max(initial=0))) + 1
     keys, wanted = bond * many + node, bonds * many + nodes
@@ -132,8 +133,8 @@ def _of(bonds: Ints, nodes: Ints, bond: Ints, node: Ints, states: Floats) -> Flo
 
 def _carried(rows: Rows, old: Rows, states: Floats, bond: Ints, now: Ints, before: Ints) -> Floats:
     """Returns the states of the new ``rows``, copied from the ``states`` of the ``old`` rows. A copy of a node inherits
-    from its parent, which is found by the corners of the tied faces ``now`` and ``before`` (p, 3). The inherited
-    impulse is proportional to the area.
+    from its parent, which is found by the corners of the tied faces ``now`` and ``before`` (p, 3). The impulse that a
+    copy inherits is proportional to its area.
     """
     pairs = np.unique(np.column_stack([np.repeat(bond, 3), now.reshape(-1), before.reshape(-1)]), axis=0)
     parents = _of(pairs[:, 0], pairs[:, 2], old.bond, old.node, np.column_stack([states, old.area]))

@@ -2,9 +2,9 @@
 walls.py, loads and prescribed motion in drivers.py.
 
 Each boundary has an account of the work of its impulses on the body. The work of an impulse at time n is added in two
-halves: one with the velocity before the impulse, one with the velocity after it. The kinetic energy of the energy
-balance at n, 1/2 m v(n-1/2) . v(n+1/2), contains the first half only. The method ``note`` adds the second half before
-the next kick.
+halves: the first is computed with the velocity before the impulse, the second with the velocity after it. The kinetic
+energy of the energy balance at n, 1/2 m v(n-1/2) . v(n+1/2), contains the first half only. The method ``note`` adds the
+second half before the next kick.
 """
 
 from abc import ABC, abstractmethod
@@ -29,7 +29,7 @@ FREE, PRESCRIBED, MIRRORED = range(3)
 component has a given value; MIRRORED: the component is zero, because the node lies on a symmetry plane across this
 axis."""
 KEPT = ("contact_loss", "external_work", "_impulse")
-"""Names of the columns, by node, that every boundary stores in a checkpoint."""
+"""Names of the columns with one row for each node that every boundary stores in a checkpoint."""
 
 
 class Boundary(ABC):
@@ -39,7 +39,7 @@ class Boundary(ABC):
     """True if the boundary acts after contact, because contact must not change the velocities that the boundary has
     corrected."""
     mirrors = False
-    """True if all nodes of the boundary lie on one plane in which the body is mirrored; exposed faces in this plane do
+    """True if all nodes of the boundary lie on one plane in which the body is mirrored. Exposed faces in this plane do
     not belong to the surface."""
     on_faces = False
     """True if the boundary acts on faces of tets, not on nodes."""
@@ -54,9 +54,9 @@ class Boundary(ABC):
         """(n, 3 walls) sum of the impulses of each wall on each node so far, N s; None if the boundary is not a
         wall."""
         self.friction_loss: Floats | None = None
-        """(n,) part of ``contact_loss`` that is due to friction, J; None without friction."""
+        """(n,) part of ``contact_loss`` that is due to friction, J; None for a boundary without friction."""
         self.last_push = 0.0
-        """Time of the last impulse, s."""
+        """Simulated time of the last impulse of the boundary, s."""
 
         self._before = np.zeros((len(nodes), 3))
         """(n, 3) velocity v(n-1/2) of each node, m/s."""
@@ -67,7 +67,7 @@ class Boundary(ABC):
         self._notes = Arguments(*impulses.NOTE)
         self._rooms = Rooms("nodes", *KEPT, "_before")
         self._kept: tuple[str, ...] = KEPT
-        """Names of the columns, by node, that this boundary stores in a checkpoint."""
+        """Names of the columns with one row for each node that this boundary stores in a checkpoint."""
 
     @abstractmethod
     def held_components(self) -> Bits:
@@ -79,11 +79,11 @@ class Boundary(ABC):
         """Makes the initial velocities consistent with the boundary."""
 
     def note(self, state: Nodes) -> None:  # noqa: B027 (a symmetry plane does no work)
-        """Stores v(n-1/2) before the kick, and adds the second half of the work of the last impulses to the account."""
+        """Stores v(n-1/2) before the kick. Adds the second half of the work of the last impulses to the account."""
 
     def _note(self, state: Nodes, account: Floats, factor: float) -> None:
-        """Executes ``note``. ``account``: work of the impulses, J; ``factor``: 1/2 with the sign that the work has in
-        the account.
+        """Runs the kernel of ``note``. ``account``: work of the impulses, J; ``factor``: 1/2 with the sign that the
+        work has in the account.
         """
         table = self._note_table(state, account, factor)
         self.over.run(impulses.note, table, len(self.nodes))
@@ -92,15 +92,15 @@ class Boundary(ABC):
         return self._notes.set(state.v, self.nodes, self._before, self._impulse, account, factor)
 
     def noting(self, state: Nodes) -> list[Stage]:
-        """Returns the work of ``note`` as stages of a program (stretch.py)."""
+        """Returns the kernels of ``note`` as stages of a program (stretch.py)."""
         return []
 
     def acting(self, state: Nodes) -> list[Stage] | None:
-        """Returns the work of ``apply`` as stages of a program; None if code outside of the program is needed."""
+        """Returns the kernels of ``apply`` as stages of a program; None if code outside of the program is needed."""
         return None
 
     def mirroring(self, vectors: Floats) -> list[Stage]:
-        """Returns the work of ``mirror`` as stages of a program."""
+        """Returns the kernels of ``mirror`` as stages of a program."""
         return []
 
     def went_on(self, dt: float) -> None:  # noqa: B027 (most boundaries need no time step)
@@ -116,14 +116,14 @@ class Boundary(ABC):
 
     @abstractmethod
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        """Corrects v(n+1/2) at time ``t``, s; ``dt``: time step, s."""
+        """Corrects the velocities v(n+1/2) at the simulated time ``t``, s; ``dt``: time step, s."""
 
     def after_move(self, state: Nodes) -> None:  # noqa: B027 (most boundaries act on velocities alone)
-        """Corrects x(n+1)."""
+        """Corrects the positions x(n+1)."""
 
     def release(self, loose: Flags, bounds: "list[Boundary]") -> None:  # noqa: B027 (most hold a node, tets or not)
-        """Treats the nodes without tets, ``loose`` (nodes,), as particles from now on. ``bounds``: all boundaries. The
-        boundaries before this one in the list have already released their nodes.
+        """Treats the nodes without tets, ``loose`` (nodes,), as particles after this call. ``bounds``: all boundaries.
+        The boundaries before this one in the list have already released their nodes.
         """
 
     def grow(self, split: Split, ids: Ints) -> None:
@@ -168,7 +168,7 @@ class Stopping(Boundary):
     after_contact = True
 
     def __init__(self, nodes: Indices, walls: int, *, reports: bool) -> None:
-        """``walls``: number of walls; ``reports``: whether ``since_last_report`` will be called."""
+        """``walls``: number of walls; ``reports``: True if the run will call ``since_last_report``."""
         super().__init__(nodes)
         self.given: Floats = np.zeros((len(nodes), 3 * walls))
         self._kept = (*KEPT, "given")
@@ -184,7 +184,7 @@ class Stopping(Boundary):
 
 
 class SymmetryPlane(Boundary):
-    """Symmetry plane. While a node that starts on the plane has tets, it has no velocity across the plane, because its
+    """Symmetry plane. A node that starts on the plane has no velocity across the plane while it has tets, because its
     tets and their mirror images hold it there. If the node has lost all tets, the node and its image are particles
     (mirrors.py).
     """
@@ -192,8 +192,9 @@ class SymmetryPlane(Boundary):
     mirrors = True
 
     def __init__(self, nodes: Indices, axis: int, beside: Flags | None = None) -> None:
-        """``beside`` (n,): whether the body of a node lies on one side of the plane, with its mirror image on the other
-        side; None: all bodies do. The nodes of a body that lies on both sides stay on the plane.
+        """``beside`` (n,): True for a node whose body lies on one side of the plane, with its mirror image on the other
+        side; None if this is true for all bodies. If a body lies on both sides of the plane, its nodes remain on the
+        plane.
         """
         super().__init__(nodes)
         self._axis = axis
@@ -257,7 +258,7 @@ class Acts:
 
 
 def mirrored(n: int, bounds: Iterable[Boundary]) -> Flags:
-    """Returns (n, 3) which velocity components of ``n`` nodes are held by symmetry planes."""
+    """Returns (n, 3) flags of velocity components: True if symmetry planes hold the component of the node."""
     found = np.zeros((n, 3), bool)
     for bound in bounds:
         found[bound.nodes] |= bound.held_components() == MIRRORED
@@ -265,7 +266,7 @@ def mirrored(n: int, bounds: Iterable[Boundary]) -> Flags:
 
 
 def driven(n: int, bounds: Iterable[Boundary]) -> Flags:
-    """Returns (n,) whether each node has a prescribed velocity component."""
+    """Returns (n,) flags: True if a velocity component of the node is prescribed."""
     found = np.zeros(n, bool)
     for bound in bounds:
         found[bound.nodes] |= (bound.held_components() == PRESCRIBED).any(axis=1)

@@ -29,13 +29,13 @@ class Driver(Boundary):
         return self.over.stages(impulses.note, self._note_table(state, self.external_work, 0.5), (), len(self.nodes))
 
     def _act(self, kernel: Kernel, arguments: Arguments, state: Nodes, *values: Any) -> None:
-        """Applies a kernel (impulses.py). ``arguments``: types of the arguments; ``values``: arguments after those that
-        all kernels have.
+        """Applies a kernel of impulses.py. ``arguments``: types of the arguments; ``values``: the arguments that follow
+        those that all kernels have.
         """
         self.over.run(kernel, arguments.set(*self._of(state), *values), len(self.nodes))
 
     def _acting(self, kernel: Kernel, arguments: Arguments, state: Nodes, *values: Any) -> list[Stage]:
-        """Returns the work of ``_act`` as stages of a program."""
+        """Returns the kernel of ``_act`` as stages of a program."""
         return self.over.stages(kernel, *arguments.bind(*self._of(state), *values), len(self.nodes))
 
     def _of(self, state: Nodes) -> tuple[Any, ...]:
@@ -43,18 +43,18 @@ class Driver(Boundary):
 
 
 class Course:
-    """Factor over time. The factor is linear between the given ``points`` (time, s, and factor), and constant before
-    the first and after the last point; without points it is 1.
+    """Factor of a load as a function of time. The factor is linear between the given ``points`` (time, s, and factor),
+    and constant before the first and after the last point. Without points the factor is 1.
     """
 
     def __init__(self, points: Sequence[tuple[float, float]] = ()) -> None:
         self._times, self._factors = np.array(list(points) or [(0.0, 1.0)]).T
         self.constant = float(self._factors[0]) if len(self._factors) == 1 else None
-        """The factor if it is constant, else None."""
+        """Value of the factor if it is constant, else None."""
 
     def mean(self, begin: float, end: float) -> float:
-        """Returns the exact mean of the factor between two times, s. If the two times are equal, returns the factor at
-        that time.
+        """Returns the exact mean of the factor between two times, s. If the two times are equal, the result is the
+        factor at that time.
         """
         if self.constant is not None:
             return self.constant
@@ -67,7 +67,7 @@ class Course:
 
 
 class Forcing(Driver):
-    """A driver that acts for the mean of the last and the present time step, times the mean of the factor of its
+    """Boundary whose load acts for the mean of the last and the present time step, multiplied by the mean factor of the
     ``course`` in this time.
     """
 
@@ -86,8 +86,8 @@ class Forcing(Driver):
         self._last_dt = dt
 
     def _duration(self, dt: float, t: float) -> float:
-        """Returns the mean of the last and the present time step at time ``t``, times the mean factor, s; stores ``dt``
-        as the last step.
+        """Returns the mean of the last and the present time step at time ``t``, multiplied by the mean factor, s.
+        Stores ``dt`` as the last time step.
         """
         mean_dt = 0.5 * (self._last_dt + dt)
         factor = self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
@@ -95,8 +95,8 @@ class Forcing(Driver):
         return mean_dt * factor
 
     def _forcing(self, kernel: Kernel, arguments: Arguments, state: Nodes, vectors: Floats) -> list[Stage] | None:
-        """Returns a kernel with its arguments, the ``vectors`` and the duration, as stages of a program; None if the
-        factor is not constant.
+        """Returns a kernel with its arguments, the ``vectors`` and the time for which they act, as stages of a program;
+        None if the factor is not constant.
         """
         factor = self._course.constant
         return None if factor is None else self._acting(kernel, arguments, state, vectors, Follow(MEAN_DT, factor))
@@ -174,9 +174,10 @@ class Traction(Forcing):
 
 
 class PrescribedVelocity(Driver):
-    """Prescribed velocity components of nodes, multiplied by the factor of the ``course``; NaN for a free component.
+    """Prescribed velocity components of nodes, multiplied by the factor of the ``course``. The value is NaN for a free
+    component.
 
-    A step uses the mean of the factor over its length, so that positions at n are exact.
+    A step uses the mean of the factor over the length of the step, so that positions at n are exact.
     """
 
     def __init__(self, nodes: Indices, velocity: Floats, course: Course) -> None:

@@ -1,5 +1,5 @@
-"""Kernels for the impulses of boundaries on nodes, and for halves of the work of the impulses. A kernel is a task over
-a range of the nodes of a boundary (boundaries.py).
+"""Kernels that apply impulses of boundaries to nodes and sum the work of these impulses. A kernel is a task over a
+range of the nodes of a boundary (boundaries.py).
 """
 
 import numpy as np
@@ -10,15 +10,15 @@ from ..parallel.team import TASK
 
 _F, _F1, _F2, _N1 = types.float64, types.float64[::1], types.float64[:, ::1], types.int32[::1]
 NOTE = _F2, _N1, _F2, _F2, _F1, _F
-"""Types of the arguments of ``note``: v (nodes, 3); nodes (n,) of the boundary; for each of these nodes v(n-1/2) and
-the impulses (n, 3), N s, and the account of their work (n,), J; and 1/2 with the sign that the work has in the
-account."""
+"""Types of the arguments of ``note``: v (nodes, 3); nodes (n,) of the boundary; velocities v(n-1/2) (n, 3) of these
+nodes, m/s; impulses on these nodes (n, 3), N s; account of the work of the impulses (n,), J; and 1/2 with the sign that
+the work has in the account."""
 _ACT = _F2, _F1, _N1, _F2, _F2, _F1
-"""Types of the arguments that all kernels with external work have: v, mass (nodes,) and nodes of the boundary; for each
-node of the boundary v(n-1/2), the impulse and the account, as in ``NOTE``."""
+"""Types of the arguments that all kernels with external work have: v, mass (nodes,), and nodes of the boundary. Then,
+for each node of the boundary: v(n-1/2), the impulse and the account, as in ``NOTE``."""
 PRESCRIBE = (*_ACT, _F2, _F)
-"""Types of the further arguments of ``prescribe``: velocities (n, 3), m/s, with NaN for a free component, and the
-factor of the velocities."""
+"""Types of the further arguments of ``prescribe``: velocities (n, 3), m/s, with NaN for a free component; and the
+factor by which the velocities are multiplied."""
 ACCELERATE = (*_ACT, _F1, _F)
 """Types of the further arguments of ``accelerate``: acceleration (3,), m/s^2, and the time for which it acts, s."""
 PUSH = (*_ACT, _F2, _F)

@@ -1,5 +1,4 @@
-"""Symmetry planes for nodes that do not start on the plane. A node that reaches the plane hits its own mirror image
-there.
+"""Symmetry planes for nodes that do not start on the plane. Such a node hits its own mirror image at the plane.
 
 A node with tets and its image exert equal forces on each other, so that neither of the two passes the plane: the plane
 acts as a wall on each side. Nodes without tets do not interact. A node without tets passes its image and is replaced by
@@ -23,10 +22,10 @@ from ..scene.conditions import AXES, node_sides, part_sides
 from .boundaries import Boundary, driven, free
 
 _TOGETHER = 64
-"""Number of nodes that are tested together in one loop with vector instructions; they are tested one by one only if at
+"""Number of nodes that are tested together in one loop with vector instructions. Nodes are tested one by one only if at
 least one of them would end beyond the plane."""
 _TURNS = 1000
-"""Largest number of planes that a node without tets may pass in a step; the limit ends the loop if the velocity is not
+"""Largest number of planes that a node without tets may pass in a step. The limit ends the loop if the velocity is not
 finite."""
 
 
@@ -56,17 +55,18 @@ class Mirrors(Boundary):
         self._axes, self._at, self._sides, self._restitution = axes, at, sides, restitution
         self._loose_sides = sides.copy() if loose_sides is None else loose_sides
         self._loose: Ints = np.zeros(0, np.int64)
-        """Places of the nodes without tets, as indices in the arrays of the boundary."""
+        """Places of the nodes without tets. A place is an index in the arrays of the boundary."""
         self._reflected: Ints = np.zeros(0, np.int64)
         self._aside = np.zeros((0, 3))
-        """Places of the nodes that are reflected in this step; also vectors from the new positions of these nodes to
-        the positions of their images, m."""
+        """Places of the nodes that are reflected in this step; and vectors from the new positions of these nodes to the
+        positions of their images, m."""
         self._takes, self._stops = Arguments(*_TAKE), Arguments(*_STOP)
 
     @classmethod
     def of(cls, case: Case, model: Model, bounds: list[Boundary], comm: Comm) -> Self:
-        """Returns the symmetry planes of a case with the nodes that start beside a plane or may pass a plane when they
-        have lost their tets. Nodes with a prescribed motion and nodes of rigid parts are left out. Collective.
+        """Returns the symmetry planes of a case with two kinds of nodes: nodes that start beside a plane, and nodes
+        that may pass a plane after they have lost their tets. Nodes with a prescribed motion and nodes of rigid parts
+        are left out. Collective.
         """
         specs, of = [spec for _, spec in case.boundaries_of(Symmetry)], model.nodes.part
         axes, at = np.array([AXES[spec.axis] for spec in specs]), np.array([spec.at for spec in specs])
@@ -135,14 +135,14 @@ def _book(loss, impulse, before, j):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64[::1])", cache=True)
 def _book_all(loss, impulse, before, rows):  # type: ignore[no-untyped-def]
-    """Executes ``_book`` for the given ``rows``."""
+    """Runs ``_book`` for the given ``rows``."""
     for j in rows:
         _book(loss, impulse, before, j)
 
 
 @njit("boolean(float64[:, ::1], int64)", cache=True)
 def _stopped(impulse, j):  # type: ignore[no-untyped-def]
-    """Returns whether the node at place ``j`` has an impulse."""
+    """Returns True if the node at place ``j`` has an impulse."""
     return impulse[j, 0] != 0.0 or impulse[j, 1] != 0.0 or impulse[j, 2] != 0.0
 
 
@@ -194,9 +194,9 @@ def _stop(table, begin, end, thread):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def _reflect(x, v, impulse, mass, nodes, rows, axes, at, sides, dt):  # type: ignore[no-untyped-def]
-    """Reflects the nodes at the places ``rows`` that would end the step beyond planes: each gets the velocity of its
-    last image. Adds the impulses to ``impulse``. Returns the places of the reflected nodes, and (n, 3) the vectors from
-    their positions at the end of the step to the positions of their images, m.
+    """Reflects the nodes at the places ``rows``, which would end the step beyond planes. Each node gets the velocity of
+    its last image. Adds the impulses to ``impulse``. Returns the places of the reflected nodes, and (n, 3) the vectors
+    from their positions at the end of the step to the positions of their images, m.
     """
     turned, aside, n = np.empty(len(rows), np.int64), np.zeros((len(rows), 3)), 0
     for j in rows:

@@ -8,8 +8,8 @@ r"""Rigid walls that move or are round. The walls stop the nodes of deformable b
           |    .  v
         ==|=====.=======> dt V  wall     mirrored components: held by planes of symmetry, no impulse
 
-As at a fixed plane (walls.py), impulses never pull. A wall with a mass M ends the step with the velocity V that all
-impulses give it; v is the solution of
+As at a fixed plane (walls.py), impulses never pull. A wall with a mass M ends the step with the velocity V that results
+from all impulses on it. V is the solution of
 
     M (V - V(n-1/2)) + sum of the impulses, which increase with V, = 0
 
@@ -32,30 +32,28 @@ from .wall_shapes import SHAPES, Walls, gap
 from .walls import ACROSS
 
 _NEWTON, _ENOUGH = 20, 1e-9
-"""Largest number of Newton iterations, and the relative change of V at which the iteration ends. Without sliding the
-sum of impulses is piecewise linear in V, so that two or three iterations are enough."""
+"""Largest number of Newton iterations, and the relative change of V at which the iteration ends. If no node slides, the
+sum of impulses is piecewise linear in the velocity V of the wall, so that two or three iterations are enough."""
 _SWEEPS = 4
 """Number of passes over the walls if there are several walls (walls.py)."""
 _LINE = 16
 """Number of words of the sums of a thread: impulse (3), and the derivative of the impulse (xx, yy, zz, yz, zx, xy).
-Further words are added so that two threads do not write to the same cache line."""
+Unused words follow, so that two threads do not write to the same cache line."""
 
 
 class MovingWalls(Stopping):
-    """Moving or round walls. ``held`` (n, w): whether each of the ``walls`` stops each node; always False for fixed
-    planes.
-    """
+    """Moving or round walls. ``held`` (n, w): True if wall w stops node n; always False for fixed planes."""
 
     def __init__(
         self, nodes: Indices, owned: Flags, walls: Walls, held: Flags, planes: Flags, comm: Comm, reports: bool = False,
     ) -> None:  # fmt: skip
-        """``owned`` (n,): whether this rank owns each node; ``planes`` (n, 3): components held by symmetry planes;
-        ``reports``: whether ``since_last_report`` will be called.
+        """``owned`` (n,): True for each node that this rank owns; ``planes`` (n, 3): components held by symmetry
+        planes; ``reports``: True if the run will call ``since_last_report``.
         """
         super().__init__(nodes, walls.n, reports=reports)
         self.walls, self._owned, self._held, self._mirrored, self._comm = walls, owned, held, planes, comm
         self.scale = self._weight = 1.0
-        """Number of quanta per N s for impulses, and per kg for the derivative."""
+        """Number of quanta per N s of impulses, and number of quanta per kg of the derivative."""
         n, w = len(nodes), walls.n
         self._step, self._rubbed = np.zeros((2, n, 3 * w))
         """(n, 3 walls) impulses of the last step, N s, and the part of them that is friction."""
@@ -140,7 +138,7 @@ class MovingWalls(Stopping):
 
     def _sum(self, state: Nodes, k: int, speed: Floats, dt: float, *, gives: bool) -> Ints:
         """(_LINE,) sums over the owned nodes: impulses of wall ``k`` if its velocity is ``speed`` (3,), and the
-        derivative of the impulses. For a wall with a mass the sums are over all ranks. ``gives``: whether the impulses
+        derivative of the impulses. For a wall with a mass the sums are over all ranks. ``gives``: True if the impulses
         are applied to the nodes.
         """
         sums, walls = np.zeros((self.over.threads, _LINE), np.int64), self.walls
@@ -244,7 +242,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                 rubbed[j, 3 * k + i] += mass[a] * rub
             if owned[j]:
                 sums[thread, i] += words[i]
-        # 5. Unless ``gives``, add the derivative of the impulse by the velocity of the wall.
+        # 5. If ``gives`` is False, add the derivative of the impulse with respect to the velocity of the wall.
         if owned[j] and not gives:
             sticks = mu > 0.0 and share == 1.0
             for m in range(6):

@@ -1,9 +1,9 @@
 """Pressure that follows the surface: it acts on the present area of each face, along the present normal of the face.
 
 The force of a face, -p (b - a) x (c - a) / 2, is distributed in thirds to its nodes a, b, c. The forces are integers in
-quanta that are a power of two, so that sums over faces do not depend on the order of the faces. Shared nodes are
-completed in one exchange. Impulses and work are computed as for a traction, with x(n), v(n-1/2) and v(n+1/2) of the
-nodes, so the energy account closes for any motion of the surface.
+quanta that are a power of two, so that sums over faces do not depend on the order of the faces. The sums of shared
+nodes are completed in one exchange. Impulses and work are computed as for a traction, with x(n), v(n-1/2) and v(n+1/2)
+of the nodes, so the energy account closes for any motion of the surface.
 
 The faces of a closed surface have zero total force and moment up to round-off, which is half a quantum for each node
 and face. At the start the largest force on a node of a face is 2^42 quanta.
@@ -31,10 +31,10 @@ from .drivers import Course, Forcing
 
 _BITS = 42
 """Binary logarithm of the number of quanta in the largest force on a node of a face at the start. Chosen value: the
-round-off is 1e-13 of the force of a face, and the area of a face may increase by a factor 2^(_MOST - _BITS)."""
+round-off is 1e-13 of the force of a face. The area of a face may increase by a factor 2^(_MOST - _BITS)."""
 _MOST = 56
-"""Binary logarithm of the largest number of quanta on a node of a face; with this limit the sum at a node can have 64
-faces without overflow."""
+"""Binary logarithm of the largest number of quanta on a node of a face. With this limit the sum of 64 faces at a node
+cannot overflow."""
 
 
 def scale(spec: Traction, outward: Floats) -> float:
@@ -66,8 +66,8 @@ class SurfacePressure(Forcing):
         self._sharing: list[Indices] = []
         """Nodes shared with each neighbour at the last planning of the exchange."""
         self._watched: list[tuple[Block, Ints, Ints]] | None = None
-        """Blocks of parts that fracture, with the faces of each block and the places of the tets of the faces; none
-        before the first use."""
+        """Blocks of parts that fracture. For each block: its loaded faces, and the places of the tets of these faces.
+        The list is empty before its first use."""
 
     @property
     def force(self) -> Floats:

@@ -49,8 +49,8 @@ class Walls:
         )  # fmt: skip
         self.friction = np.array([each.friction for each in specs])
         self.given = np.array([each.velocity for each in specs]).reshape(n, 3)
-        """(w, 3) velocity of each wall that the case gives, m/s; it is the velocity at the start, or is multiplied by
-        the factor of the wall's course."""
+        """(w, 3) velocity of each wall in the case, m/s. It is the velocity at the start, or it is multiplied by the
+        factor of the wall's course."""
         self._courses = [Course(each.course) for each in specs]
         self.mass = np.array([each.mass or np.inf for each in specs])
         """(w,) mass of each wall, kg; infinite for a fixed or driven wall."""
@@ -68,7 +68,7 @@ class Walls:
         return len(self.mass)
 
     def places(self, n: int) -> Floats | None:
-        """Returns (n, 3) the positions of the first ``n`` walls, m; None if no wall of them moves."""
+        """Returns (n, 3) the positions of the first ``n`` walls, m; None if none of these walls moves."""
         moves = (self.lightness[:n] > 0.0) | self.given[:n].any(axis=1)
         return self.shapes.point[:n].copy() if moves.any() else None
 
@@ -87,7 +87,7 @@ class Walls:
         return bytes(self.shapes.point[moving].tobytes() + self.speed[moving].tobytes())
 
     def kinetic(self) -> float:
-        """Returns the kinetic energy of the walls with a mass at n, J: half of the mass times the product of the
+        """Returns the kinetic energy at n of the walls with a mass, J. It is half of the mass times the product of the
         velocities before and after n.
         """
         free = self.lightness > 0.0

@@ -11,12 +11,12 @@ from .boundaries import KEPT, Boundary, Stopping, free, mirrored
 from .impulses import book
 
 _SWEEPS = 4
-"""Largest number of passes over the walls for each node; chosen value: two walls at right angles need one pass. The
-error that remains at a sharper corner is corrected in the next step."""
+"""Largest number of passes over the walls for each node. Chosen value: two walls at right angles need one pass. At a
+sharper corner an error remains, which the next step corrects."""
 ACROSS = 1e-12
-"""Smallest squared length of the unit normal of a wall after the components held by symmetry planes are set to zero;
-below this value the wall is parallel to a symmetry plane and cannot push the node. The chosen value is far above
-round-off (1e-32) and below any intended angle."""
+"""Smallest squared length of the unit normal of a wall after the components held by symmetry planes are set to zero. If
+the value is smaller, the wall is parallel to a symmetry plane and cannot push the node. Chosen value: it is far above
+round-off (1e-32) and below the value of any angle that a user intends."""
 
 
 class RigidWalls(Stopping):
@@ -24,20 +24,20 @@ class RigidWalls(Stopping):
     never pulls. A friction impulse along the wall reduces the sliding velocity of the node; it is at most Coulomb's
     ``friction`` (w,) times the normal impulse.
 
-    ``points`` and ``normals`` (w, 3); ``held`` (n, w): whether each wall stops each node. A node between two walls is
-    stopped by the first wall, then by the second wall, several times. ``mirrored`` (n, 3): components held by symmetry
-    planes, or None. If a wall is not at right angles to a symmetry plane, it pushes the nodes on the symmetry plane
-    along this plane.
+    ``points`` and ``normals`` (w, 3); ``held`` (n, w): True if wall w stops node n. A node between two walls is stopped
+    by the first wall, then by the second wall, several times. ``mirrored`` (n, 3): components held by symmetry planes,
+    or None. If a wall is not at right angles to a symmetry plane, it pushes the nodes on the symmetry plane along this
+    plane.
     """
 
     def __init__(
         self, nodes: Indices, points: Floats, normals: Floats, held: Flags, mirrored: Flags | None = None,
         friction: Floats | None = None, reports: bool = False,
     ) -> None:  # fmt: skip
-        """``reports``: whether ``since_last_report`` will be called."""
+        """``reports``: True if the run will call ``since_last_report``."""
         self._pushed = np.zeros((1, _PADDED))
-        """(threads, 8) table in which column 0 is the time of the last impulse that each thread applied, s; the other
-        columns are padding."""
+        """(threads, 8) table. Column 0 is the simulated time of the last impulse that each thread applied, s. The other
+        columns are not used."""
         super().__init__(nodes, len(points), reports=reports)
         self._friction = np.zeros(len(points)) if friction is None else friction
         self._none = np.zeros(0)
@@ -54,7 +54,7 @@ class RigidWalls(Stopping):
 
     @property
     def last_push(self) -> float:
-        """Time of the last impulse, s."""
+        """Simulated time of the last impulse of the walls, s."""
         return float(self._pushed[:, 0].max())
 
     @last_push.setter
@@ -96,12 +96,12 @@ class RigidWalls(Stopping):
         return self.over.stages(_push_out, table, ties, len(self.nodes))
 
     def _noted(self, state: Nodes) -> tuple[Floats | Indices, ...]:
-        """Returns the arguments of the kernel ``_forget``."""
+        """Returns the arguments of the kernel ``_forget`` as a tuple."""
         friction = self._none if self.friction_loss is None else self.friction_loss
         return state.v, self.nodes, self._before, self._impulse, self.contact_loss, self._rubbed, friction
 
     def _of(self, state: Nodes) -> tuple[Floats | Indices | Flags, ...]:
-        """Returns the arguments of the kernel ``_push_out``, without the numbers."""
+        """Returns the arguments of the kernel ``_push_out``, except the numbers at their end."""
         if len(self._pushed) != self.over.threads:
             self._pushed = np.full((self.over.threads, _PADDED), self.last_push)
         friction = self._none if self.friction_loss is None else self.friction_loss
@@ -190,7 +190,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                         impulse[j, i] -= mass[a] * share * slide[i]
                         rubbed[j, i] -= mass[a] * share * slide[i]
                         given[j, 3 * k + i] -= mass[a] * share * slide[i]
-            # 4. Make another pass if the node is between several walls and a wall stopped it.
+            # 4. Make another pass if a wall stopped the node and the node is between several walls.
             if not moved or len(points) == 1:
                 break
         if any_moved:

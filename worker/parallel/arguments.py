@@ -3,8 +3,9 @@ argument instead of records of arrays.
 
 A call with records as arguments costs 4 us or more, because numba unpacks each array of each record. A call with an
 address as argument costs 0.2 us, and any thread can make such a call. An array takes 1 + ndim words, its address and
-its shape. If the layout of the array is not C, ndim further words have its strides. A number or a flag takes one word;
-arrays that a kernel reads from the table have no owner and no reference counts; ``Arguments`` holds references to them.
+its shape. If the array is not in C order, ndim further words contain its strides. A number or a flag takes one word.
+Arrays that a kernel reads from the table have no owner and no reference counts. Therefore ``Arguments`` holds
+references to these arrays.
 """
 
 from collections.abc import Iterator
@@ -23,8 +24,8 @@ _ARRAY = id(np.ndarray)
 
 
 class Follow(NamedTuple):
-    """A number of a stage that changes from round to round; it is the product of a number of the program and a constant
-    factor.
+    """A number in the argument table of a stage that changes during a program. It is the product of a number of the
+    program and a constant factor.
     """
 
     number: int
@@ -33,7 +34,7 @@ class Follow(NamedTuple):
 
 
 class Tie(NamedTuple):
-    """A word of a table that changes with a number of the program."""
+    """A word of an argument table that changes with a number of the program."""
 
     number: int
     factor: float
@@ -42,7 +43,7 @@ class Tie(NamedTuple):
 
 
 class Arguments:
-    """A table for arguments of the numba types ``kinds``; a record is one argument."""
+    """A table for arguments of the numba types ``kinds``. A record counts as one argument."""
 
     def __init__(self, *kinds: Any) -> None:
         self._kinds = list(_leaves(several(*kinds)))
@@ -75,9 +76,8 @@ class Arguments:
         """Write the arguments into the table and return its address. Arrays that are already in the table are not
         written again.
 
-        Records are tuples, and must be at the same positions in every call. Raises ValueError if an array has another
-        type than declared. Raises ValueError also if an array is not in C order although the declared type is in C
-        order.
+        Records are tuples, and must be at the same positions in every call. Raises ValueError if an array does not have
+        the declared type, or is not in C order although the declared type is in C order.
         """
         if len(values) != len(self._values):
             self._divide(values)
@@ -107,8 +107,8 @@ class Arguments:
                 self._put(k, leaf)
 
     def bind(self, *values: Any) -> tuple[int, tuple[Tie, ...]]:
-        """Write the arguments as ``set`` does, but some of the numbers are ``Follow``. Return the address of the table,
-        and the words that the program writes; the next ``set`` writes these words again.
+        """Write the arguments as ``set`` does, but some of the numbers are ``Follow`` objects. Return the address of
+        the table, and the words that the program writes. The next call of ``set`` writes these words again.
         """
         address = self.set(*(0.0 if isinstance(value, Follow) else value for value in values))
         begins = np.cumsum([0, *np.abs(self._sizes)]).tolist()
@@ -119,7 +119,7 @@ class Arguments:
         return address, tuple(ties)
 
     def place(self, k: int) -> int:
-        """Return the address of leaf number ``k``: an array, a number or a flag."""
+        """Return the address of leaf number ``k``. A leaf is an array, a number or a flag."""
         return int(self.address + self._words.itemsize * self._places[k])
 
     def put(self, first: int, leaves: tuple[Any, ...]) -> None:

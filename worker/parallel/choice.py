@@ -15,14 +15,14 @@ from .projecting import Projecting
 from .team import Team
 
 _STEPS, _SECONDS = 10, 0.1
-"""Length of a measurement, in steps and in s. The measurement ends at the limit that is reached first, but takes at
+"""Length of a measurement, in steps and in s. The measurement ends at the limit that is reached first, but includes at
 least one step. Chosen values."""
 _AGAIN = 20.0
-"""Interval between two measurements, s; chosen value: a measurement takes less than a hundredth of the interval, unless
+"""Interval between two measurements, s. Chosen value: a measurement takes less than a hundredth of the interval, unless
 the steps are very long."""
 _WORTH = 0.98
-"""Largest ratio of the time in parallel regions with more threads to the time with fewer threads, at which more threads
-are chosen. Chosen value."""
+"""Largest ratio at which more threads are chosen: time in parallel regions with more threads, divided by the time with
+fewer threads. Chosen value."""
 
 
 class Choice:
@@ -39,8 +39,8 @@ class Choice:
         return self._due if self._team.projecting is None else 0.0
 
     def step(self) -> str:
-        """Begin or end a measurement if its time has come. If fewer threads than given are used, return a message about
-        this once.
+        """Begin or end a measurement if this is scheduled. If fewer threads than given are used, return a message about
+        this, once in a run.
         """
         trial, now = self._team.projecting, time.monotonic()
         if trial is None:
@@ -78,7 +78,7 @@ class Choice:
 
 def best_crew(crews: list[int], spans: list[float]) -> int:
     """Return the number of threads to use. ``spans``: time in parallel regions, s, for each number of threads in
-    ``crews``.
+    ``crews``; a crew is a possible number of threads.
     """
     best = 0
     for k in range(1, len(crews)):

@@ -1,5 +1,5 @@
-"""Communication between ranks. The module defines the operations, and their result on a single rank; mpi.py implements
-the operations with MPI.
+"""Communication between ranks. The module defines the operations, and implements them for a single rank. mpi.py
+implements the operations with MPI.
 
 All decisions of ranks are maxima or sums of int64 words, which do not depend on the order of the ranks.
 """
@@ -19,8 +19,8 @@ from .tags import Tag
 class Sent:
     """Counts of the data that a rank has sent since the last report: messages to single ranks, and collectives.
 
-    The bytes of a collective are the bytes that this rank contributes. An object needs two collectives, because its
-    length is sent first.
+    The bytes of a collective are the bytes that this rank contributes. The transfer of an object needs two collectives,
+    because the length of the object is sent first.
     """
 
     messages: int = 0
@@ -39,7 +39,7 @@ class Sent:
         self.collective_bytes += size
 
     def since_last(self) -> dict[str, int]:
-        """Return the counts and set them to zero."""
+        """Return the counts, then set them to zero."""
         counts = asdict(self)
         self.messages = self.bytes = self.collectives = self.collective_bytes = 0
         return counts
@@ -49,7 +49,7 @@ class Pending(Protocol):
     """A communication in progress."""
 
     def finish(self) -> None:
-        """Return when the data has arrived."""
+        """Wait until the data has arrived."""
 
 
 class Comm(Protocol):
@@ -111,11 +111,11 @@ class Comm(Protocol):
         """Return, on every rank, the item of rank 0."""
 
     def barrier(self) -> None:
-        """Return when every rank has made this call."""
+        """Wait until every rank has made this call."""
 
     def await_all(self) -> None:
-        """Return when every rank has made this call. Used for long waits, because the call sleeps; ``barrier``
-        polls.
+        """Wait until every rank has made this call. The function is used for long waits, because it sleeps; ``barrier``
+        uses the core while it waits.
         """
 
 
@@ -126,7 +126,7 @@ class Exchange(Protocol):
         """Start all sends and receives."""
 
     def finish(self) -> None:
-        """Return when the receive buffers are filled and the send buffers may be written again."""
+        """Wait until the receive buffers are filled and the send buffers may be written again."""
 
     def free(self) -> None:
         """Free the MPI requests."""

@@ -5,10 +5,10 @@ No rank has the points of another rank. Therefore the position of a cut is found
 over all ranks.
 
 Ranks wait for each other within a step, after contact and after the elements. Therefore it is not sufficient to halve
-the sum of the loads: if one rank has all contact and another rank has all tets, with equal sums, each rank waits for
-the other. In three dimensions some plane halves any three measures at once (the ham sandwich theorem). If a point has
-several weights, one for each phase, planes of many directions are tried. Each tried plane halves the sum of the
-weights; the plane that divides the phases most evenly is chosen.
+the sum of the loads. For example, if one rank has all contact, another rank has all tets, and their sums are equal,
+each rank waits for the other. In three dimensions some plane halves any three measures at once (the ham sandwich
+theorem). If a point has several weights, one for each phase, planes of many directions are tried. Each tried plane
+halves the sum of the weights; the plane that divides the phases most evenly is chosen.
 """
 
 from dataclasses import dataclass
@@ -22,35 +22,36 @@ from ..model.state import Flags, Floats, Indices, Ints
 from .comm import Comm
 
 _LEVELS = 2.0**31 - 1.0
-"""Number of distinct positions along a normal. Points at equal positions are ordered by their ids."""
+"""Number of distinct positions along a normal. Points at equal positions are ordered by their global ids."""
 _ID_BITS = 32
 """Number of bits for the id in a sorting key of 63 bits. The 31 higher bits have the position; ids are below 2^32."""
 _DIGIT = 8
-"""Number of bits of a sorting key that are determined by one sum over the ranks; with the chosen value a sum has 256
-counts for each box, and eight sums are needed."""
+"""Number of bits of a sorting key that are determined by one sum over the ranks. With the chosen value a sum has 256
+counts for each box, and eight sums are needed for a key."""
 _FINEST = 2.0**30
 """Value of the largest weight in quanta; with this value sums of four billion weights are exact."""
 _BINS = 128
-"""Number of slices into which the weights along a direction are binned when directions are compared."""
+"""Number of slices along a direction. The weights of the points are summed in the slices when directions are
+compared."""
 _SHORT = 0.2
-"""Smallest ratio of an extent of a box to the longest extent of the box. A box is cut across an extent only if the
-ratio is not smaller (with extents scaled by ``run.cut_scale``)."""
+"""Smallest ratio of an extent of a box to the longest extent of the box. A box is cut across an extent only if its
+ratio is at least this value (with extents scaled by ``run.cut_scale``)."""
 _SURFACE = 0.05
 """Penalty for a cut that goes through twice as much weight as the cut in the direction with the least weight. The
-penalty is a fraction of the time."""
+penalty is a fraction of the time of a step."""
 _TOGETHER = 8
-"""Number of boxes whose slices are summed over the ranks in one call; the number is fixed, so that the memory does not
+"""Number of boxes whose slices are summed over the ranks in one call. The number is fixed, so that the memory does not
 increase with the number of ranks."""
 _THICK = 2
 """Number of slices on each side of a cut from which the weight at the cut is computed."""
 _SAMPLE = 4096
 """Number of sampled points in a box by which directions are compared. Only points that have a weight in the first phase
-alone are sampled; all other points are used. Chosen value: with 4,000 points in 128 slices the error of the middle is
-below a hundredth of the box."""
+alone are sampled; all other points are used. Chosen value: with 4,000 points in 128 slices the position of the middle
+has an error below a hundredth of the box."""
 
 
 def _directions() -> Floats:
-    """Return (49, 3) unit normals. Of two opposite directions only one is returned.
+    """Return (49, 3) unit normals of possible cuts. If two directions are opposite, only one of them is returned.
 
     The axes come first, then all directions whose components have the ratios 0, 1 and 2.
     """
@@ -61,7 +62,7 @@ def _directions() -> Floats:
 
 DIRECTIONS = _directions()
 _AXES = 3
-"""Number of normals that are axes x, y and z; they are the first normals."""
+"""Number of normals that are the axes x, y and z. They are the first normals."""
 
 
 @dataclass
@@ -88,7 +89,9 @@ class Cut:
         (n,).
         """
         (x, y, z), extent = DIRECTIONS[self.direction], self.high - self.low
-        along = points[:, 0] * x + points[:, 1] * y + points[:, 2] * z  # one result for any length of the array
+        along = (
+            points[:, 0] * x + points[:, 1] * y + points[:, 2] * z
+        )  # the result does not depend on the length of the array
         share = (along - self.low) / (extent if extent > 0.0 else 1.0)
         return np.asarray((np.clip(share, 0.0, 1.0) * _LEVELS).astype(np.int64) << _ID_BITS | ids)
 
@@ -119,7 +122,9 @@ def bisect(
 
 
 def place(cuts: list[Cut], points: Floats) -> Indices:
-    """Return (n,) the part to which each of further points (n, 3) belongs."""
+    """Return (n,) the part to which each of the points (n, 3) belongs. The points are not among those from which the
+    cuts were made.
+    """
     owner, none = np.zeros(len(points), np.int32), np.zeros(len(points), np.int64)
     for cut in cuts:
         inside = np.flatnonzero(owner == cut.first)
@@ -153,8 +158,8 @@ def _level(
 
 
 def _extents(points: Floats, members: list[Ints], directions: list[Floats], comm: Comm) -> Floats:
-    """Return (groups, 2, k) the largest position of the members of each group along each direction, and the negative of
-    the smallest position. ``directions`` (k, 3). If no rank has members, the values are zeros.
+    """Return (groups, 2, k) extreme positions of the members of each group along each direction: the largest position,
+    and the negative of the smallest position. ``directions`` (k, 3). If no rank has members, the values are zeros.
 
     Collective.
     """
@@ -193,8 +198,8 @@ def _most_even(
 
 
 def _unevenness(slices: Floats, parts: int) -> tuple[Floats, Floats]:
-    """Return the loss of a cut that halves the sum of ``slices`` (directions, bins, phases) for ``parts`` ranks, and
-    the mean weight of the slices near the cut, both (directions,).
+    """Return two values for each direction, both (directions,): the loss of a cut that halves the sum of ``slices``
+    (directions, bins, phases) for ``parts`` ranks, and the mean weight of the slices near the cut.
 
     The loss is the waiting time after the phases, divided by the whole time.
     """
@@ -218,8 +223,8 @@ def _unevenness(slices: Floats, parts: int) -> tuple[Floats, Floats]:
 def _drawn(chosen, luck, quanta, stride):  # type: ignore[no-untyped-def]
     """Return the indices of a sample of the ``chosen`` points, and their ``quanta`` (n, phases).
 
-    The sample has all points with a weight in a later phase. Of the other points one in ``stride`` points is selected
-    by the hash ``luck`` (n,), and gets ``stride`` times its weight.
+    The sample has all points with a weight in a later phase. From the other points, one in ``stride`` points is
+    selected by the hash ``luck`` (n,). Its weight is multiplied by ``stride``.
     """
     some, weights, n = np.empty(len(chosen), np.int64), np.empty((len(chosen), quanta.shape[1]), np.int64), 0
     for a in chosen:
@@ -264,8 +269,8 @@ def _slice(sums, points, quanta, chosen, directions, low, scale):  # type: ignor
 
 
 def _search(cuts: list[Cut], keys: list[Ints], quanta: list[Ints], comm: Comm) -> None:
-    """Set the key of every cut; it is the smallest key at which the weight below the cut exceeds the weight that the
-    lower side must have.
+    """Set the key of every cut. The key is the smallest one at which the weight below the cut exceeds the weight that
+    the lower side must have.
 
     Collective.
     """

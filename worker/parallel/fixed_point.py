@@ -2,8 +2,8 @@
 
 The scale of the nodal forces is computed from the largest contribution of the previous step. If a contribution is too
 large for the scale, the sum is repeated in a larger quantum. A contribution has 51 bits, and node 0 of a tet may get
-three contributions. Therefore the sum cannot overflow at a node with up to 680 tets, which is twenty times the number
-in a mesh.
+three contributions. Therefore the sum cannot overflow at a node with up to 680 tets. This is twenty times the number of
+tets at a node of a usual mesh.
 """
 
 import math
@@ -19,21 +19,21 @@ from ..model.state import Floats, Ints
 from .comm import Comm
 
 CONTRIBUTION_BITS = 51
-"""Number of bits of a contribution. A contribution is below 2^51 quanta, because the sum of such a value and 1.5 * 2^52
-in float64 is rounded to an integer (elements/forces.py)."""
+"""Number of bits of a contribution. A contribution is below 2^51 quanta. The reason: the sum of such a value and 1.5 *
+2^52 in float64 is rounded to an integer (elements/forces.py)."""
 HEADROOM_BITS = 5
 """Number of bits of headroom. Contributions may increase 32-fold in a step before the sum must be repeated."""
 _NEAREST_BITS = 0x4338000000000000
 """Bit pattern of the float64 NEAREST."""
 _MAGNITUDE, _INFINITE = 0x7FFFFFFFFFFFFFFF, 0x7FF0000000000000
-"""Mask of all bits of a float64 except its sign; and the bit pattern of infinity."""
+"""Mask of all bits of a float64 except its sign; and bit pattern of infinity."""
 _LIMB_BITS = 30
 _LIMB = 2.0**_LIMB_BITS
-"""Ratio of the quanta of the high and the low limb. Two limbs have 60 bits together; each limb can sum 2^32 values in
-an int64."""
+"""Number of quanta of the low limb in a quantum of the high limb. Two limbs have 60 bits together; each limb can sum
+2^32 values in an int64."""
 _WORD, _REAL = struct.Struct("=q"), struct.Struct("=d")
 _SMALLEST = -993
-"""Smallest exponent of the magnitudes of a column. With a smaller exponent the scale would overflow."""
+"""Smallest exponent of the largest magnitude in a column. With a smaller exponent the scale would overflow."""
 
 
 def float_of(bits: int) -> float:
@@ -56,7 +56,7 @@ def scale_for(largest):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64, float64)", cache=True)
 def outgrown(largest, scale):  # type: ignore[no-untyped-def]
-    """Return whether a contribution of ``largest``, N, exceeds the range of the scale."""
+    """Return True if a contribution of ``largest``, N, exceeds the range of the scale."""
     return not largest * scale < 2.0**CONTRIBUTION_BITS
 
 
@@ -71,7 +71,8 @@ def magnitude(bits):  # type: ignore[no-untyped-def]
 @njit("int64(float64[::1])", cache=True, error_model="numpy")
 def most(values):  # type: ignore[no-untyped-def]
     """Return the largest magnitude as its bit pattern (integer). Bit patterns have the order of the floats. The bit
-    pattern of a value that is not finite is above those of all finite values, so a maximum over ranks keeps this value.
+    pattern of a value that is not finite is larger than those of all finite values. Therefore a maximum over ranks
+    keeps such a value.
     """
     found = np.int64(0)
     for i in range(len(values)):
@@ -115,15 +116,15 @@ def _whole(words: Ints) -> Floats:
     """
     high, low = words[..., 0, :], words[..., 1, :]
     over = high + (low >> _LIMB_BITS)
-    if over.size and max(int(over.max()), -int(over.min())) < 2**53:  # two exact terms, so one rounding
+    if over.size and max(int(over.max()), -int(over.min())) < 2**53:  # two exact terms, so only one rounding
         return np.asarray(over * _LIMB + (low & ((1 << _LIMB_BITS) - 1)))
     pairs = zip(high.reshape(-1).tolist(), low.reshape(-1).tolist(), strict=True)
     return np.array([float((a << _LIMB_BITS) + b) for a, b in pairs]).reshape(high.shape)
 
 
 class Tally:
-    """Sums that are accumulated over a whole run; they are integers in two limbs, independent of the order of the terms
-    and of ranks.
+    """Sums that are accumulated over a whole run. The sums are integers in two limbs, and do not depend on the order of
+    the terms and on the ranks.
     """
 
     def __init__(self, largest: Floats) -> None:
@@ -150,8 +151,8 @@ class Tally:
     def carry(self) -> None:
         """Move the overflow of the low limbs to the high limbs; the values of the sums do not change.
 
-        A low limb gets at most 2^29 quanta from each value; without ``carry`` it would overflow after 2^34 values;
-        contact may add as many values in a long run.
+        Each value adds at most 2^29 quanta to a low limb. Without ``carry`` the limb would overflow after 2^34 values,
+        and contact may add so many values in a long run.
         """
         high, low = self.words
         over = (low + (1 << (_LIMB_BITS - 1))) >> _LIMB_BITS
@@ -225,8 +226,8 @@ def exact_totals(comm: Comm, *tables: Columns) -> tuple[Floats, Floats]:
 
 
 def totals_and_words(comm: Comm, tables: Sequence[Columns], more: Ints) -> tuple[Floats, Floats, Ints]:
-    """Return the result of ``exact_totals``, and the sums of integers ``more`` (m,) over all ranks from the same
-    reduction.
+    """Return the result of ``exact_totals``. Also return the sums of the integers ``more`` (m,) over all ranks, from
+    the same reduction.
 
     Collective.
     """

@@ -1,4 +1,4 @@
-"""Sums of columns by group of rows, with passes that the threads of a rank share (fixed_point.Columns)."""
+"""Sums of columns for each group of rows. The threads of a rank share the passes (fixed_point.Columns)."""
 
 import numpy as np
 
@@ -14,7 +14,8 @@ _F1, _F2, _N1 = types.float64[::1], types.float64[:, ::1], types.int32[::1]
 _LARGEST, _LIMBS = (_F2, _F2), (types.int64[:, :, :, ::1], _F2, _N1, _F1)
 _of_largest, _of_limbs = reader(*_LARGEST), reader(*_LIMBS)
 _ROWS = 4096
-"""Number of rows in a task. Chosen value: ten columns take some 20 us; to start a parallel region takes 2 us."""
+"""Number of rows in a task. Chosen value: a task with ten columns takes about 20 us; the start of a parallel region
+takes 2 us."""
 
 
 @njit(TASK, cache=True, error_model="numpy")
@@ -45,8 +46,8 @@ def _limbs(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 
 class Grouped:
-    """Columns (k, n) whose row i belongs to the group ``group[i]``, for sums (fixed_point.Columns). Sums are fast if
-    neighbouring rows are in one group.
+    """Columns (k, n) that are summed for each group of rows (fixed_point.Columns). Row i belongs to the group
+    ``group[i]``. Sums are fast if neighbouring rows are in one group.
     """
 
     def __init__(self, team: Team, groups: int) -> None:

@@ -15,7 +15,7 @@ from .comm import Comm, Exchange, Pending, Sent, SerialComm
 from .tags import Tag
 
 _NAP = 0.01
-"""Interval between two checks in a wait that leaves the core to other processes, s; chosen value: a hundredth of the
+"""Interval between two checks in a wait that leaves the core to other processes, s. Chosen value: a hundredth of the
 start time of a rank."""
 
 
@@ -34,8 +34,8 @@ class MpiComm:
         MPI.pickle.__init__(self._pickled, self._unpickled)  # type: ignore[misc]
 
     def waiting(self, sign: int = 1) -> "_Waiting":
-        """Return a context that adds the CPU time of its block to ``waited``. If ``sign`` is -1, the time is
-        subtracted.
+        """Return a context that adds the CPU time of its block to ``waited``. If ``sign`` is -1, the context subtracts
+        this time.
         """
         return _Waiting(self, sign)
 
@@ -160,8 +160,8 @@ class MpiComm:
 
 
 class _Waiting:
-    """Context of a block that waits; it is a class, because every step opens dozens of contexts, and a context made
-    from a generator takes longer.
+    """Context of a block of code that waits. It is a class, because every step enters dozens of such contexts, and a
+    context made from a generator takes longer.
     """
 
     __slots__ = ("_comm", "_sign", "_start")

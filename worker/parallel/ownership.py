@@ -26,7 +26,7 @@ class Neighbour:
 
 
 def same(some: list[Neighbour], others: list[Neighbour]) -> bool:
-    """Return whether two lists have the same array objects. If so, no shared node was added."""
+    """Return True if two lists contain the same array objects. If so, no shared node was added."""
     return len(some) == len(others) and all(a.nodes is b.nodes for a, b in zip(some, others, strict=True))
 
 
@@ -59,12 +59,12 @@ def complete(comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: Tag) -> N
 
 
 class SharedSum:
-    """Completion of nodal sums, (nodes, ``columns``) int64, that can be repeated."""
+    """Completion of nodal sums, (nodes, ``columns``) int64. It can be repeated."""
 
     def __init__(
         self, comm: Comm, neighbours: list[Neighbour], columns: int, tag: Tag, *, headed: bool = False
     ) -> None:  # fmt: skip
-        """``headed``: whether a word for each neighbour is sent together with the sums."""
+        """``headed``: True if a word for each neighbour is sent together with the sums."""
         self._nodes = [n.nodes for n in neighbours]
         head = np.full(int(headed), -1, np.int32)
         self._every = np.concatenate([head[:0], *(part for nodes in self._nodes for part in (nodes, head))])
@@ -78,7 +78,7 @@ class SharedSum:
         )
 
     def serves(self, neighbours: list[Neighbour]) -> bool:
-        """Return whether the neighbours share the same nodes as when this object was made."""
+        """Return True if the neighbours share the same nodes as when this object was made."""
         return all(one.nodes is nodes for one, nodes in zip(neighbours, self._nodes, strict=True))
 
     @property

@@ -1,4 +1,5 @@
-"""Packing: the results that the tasks of a pass have written to separate ranges are copied to one array without gaps.
+"""Packing of results. The tasks of a pass write their results to separate ranges; packing copies these results to one
+array without gaps.
 
 The number of results of a task is not known before, so each task writes its results from a fixed row on. The packed
 results have the order of the tasks, so the packed array is the same for any number of threads.
@@ -33,8 +34,8 @@ def offsets(begins, counts):  # type: ignore[no-untyped-def]
 def range_offsets(begins, counts):  # type: ignore[no-untyped-def]
     """Compute where each range and each task begins in a counting sort by ranges of keys.
 
-    Set ``begins`` (ranges + 1,) to the first item of each range, and each of ``counts`` (tasks, ranges) to the first
-    item of the task in the range; return the number of items.
+    Set ``begins`` (ranges + 1,) to the index of the first item of each range. Replace each of ``counts`` (tasks,
+    ranges) by the index of the first item of the task in the range. Return the number of items.
     """
     total = 0
     for r in range(counts.shape[1]):
@@ -56,7 +57,7 @@ def _copy(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 
 class Packing:
-    """Passes that pack the results of other passes; all tasks of these passes have one length."""
+    """Passes that pack the results of other passes. All tasks of these passes have the same length."""
 
     def __init__(self, team: Team, size: int) -> None:
         """``size``: length of a task."""
@@ -66,8 +67,8 @@ class Packing:
         """Copy the results of a pass over the range from 0 to ``n`` from ``source`` to ``out``; the two arrays have
         rows of one type.
 
-        The task that begins at index f has written ``counts`` rows to ``source``, from row ``spread`` * f on; they are
-        copied to ``out``, from the row on that ``begins`` has for the task.
+        The task that begins at index f has written ``counts`` rows to ``source``, from row ``spread`` * f on. These
+        rows are copied to ``out``, from the row given by ``begins`` on.
         """
         if n:
             width = source.dtype.itemsize * int(np.prod(source.shape[1:], dtype=np.int64))

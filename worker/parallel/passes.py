@@ -10,7 +10,7 @@ from .arguments import Arguments, Tie
 from .team import Stage, Team
 
 NODES_OF_A_TASK = 4096
-"""Number of nodes in a task; chosen value: a task takes 10 us, compared with 2 us to start a parallel region."""
+"""Number of nodes in a task. Chosen value: a task takes 10 us, compared with 2 us to start a parallel region."""
 
 
 class _Range:
@@ -44,7 +44,7 @@ class _Range:
 class Ranges(_Range):
     """Runs kernels of the signature team.TASK over ranges on a team of threads.
 
-    Tasks may run at the same time, so they must not write to the same memory; the number of the task that begins at
+    Tasks may run at the same time, so they must not write to the same memory. The number of the task that begins at
     index ``first`` is ``first`` divided by ``size``.
     """
 
@@ -60,8 +60,8 @@ class Ranges(_Range):
             self._team.run(kernel, table, self._tasks, self._starts)
 
     def stages(self, kernel: Kernel, table: int, ties: tuple[Tie, ...], n: int) -> list[Stage]:
-        """Return the run of a kernel over the range from 0 to ``n`` as a stage of a program; [] if ``n`` is 0. The
-        stage is valid until another range is requested.
+        """Return a list with the stage of a program that runs a kernel over the range from 0 to ``n``; the list is
+        empty if ``n`` is 0. The stage is valid until another range is requested.
         """
         if n and n != self._n:
             self._cut(n)
@@ -84,8 +84,8 @@ class Pass(_Range):
             self._team.run(self._kernel, self._arguments.set(*values), self._tasks, self._starts)
 
     def stage(self, n: int, *values: Any) -> Stage:
-        """Return the run of the kernel over the range from 0 to ``n`` > 0 as a stage of a program. Numbers among the
-        ``values`` may be ``Follow``. The stage is valid until other arguments or another range are requested.
+        """Return the stage of a program that runs the kernel over the range from 0 to ``n`` > 0. Numbers among the
+        ``values`` may be ``Follow`` objects. The stage is valid until other arguments or another range are requested.
         """
         if n != self._n:
             self._cut(n)

@@ -1,10 +1,10 @@
-"""Programs. A program consists of stages that the threads of a rank run one after the other, in one call without Python
-code between them.
+"""Programs of kernels. A program consists of stages that the threads of a rank run one after the other, in one call
+without Python code between them.
 
-A stage is a kernel with its table of arguments and its tasks; the tasks are either given before the call (``Stage``),
-or they are a range (``Span``). The length of the range is a word of memory that is read when the stage begins, so an
-earlier stage may write it. A stage with the length 0 is skipped. A kernel may also choose the next stage: it writes the
-number of this stage to ``Program.control``. A stage number beyond the last stage ends the call.
+A stage consists of a kernel, its table of arguments, and its tasks. The tasks are either given before the call
+(``Stage``), or they are a range (``Span``). The length of the range is a word of memory. The stage reads this word when
+it begins, so an earlier stage may write it. A stage with the length 0 is skipped. A kernel may also choose the next
+stage: it writes the number of this stage to ``Program.control``. A stage number beyond the last stage ends the call.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ range, length of a task."""
 
 @njit("boolean(int64[::1], int64, int64[::1])", cache=True)
 def _of_range(job, semaphore, stage):  # type: ignore[no-untyped-def]
-    """Run a stage over a range. Return whether the stage had more than one task."""
+    """Run a stage over a range. Return True if the stage had more than one task."""
     n, size = word_at(stage[5], 0), stage[6]
     many = (n + size - 1) // size
     if many <= 1 or job[MOST] == 1:
@@ -55,7 +55,8 @@ def _of_tasks(job, semaphore, stage):  # type: ignore[no-untyped-def]
 def _run(spent, job, semaphore, stages, control, first, end, again):  # type: ignore[no-untyped-def]
     """Run the stages from ``first`` to ``end``, with ``again`` in a loop until a kernel writes a number beyond ``end``
     to ``control``. Return the number of the stage that would come next. Add the time of each stage, ns, to ``spent``
-    (stages, 2): to column 0 if the stage was a range with one task, else to column 1, the time in parallel regions.
+    (stages, 2): to column 0 if the stage was a range with one task, else to column 1, which is the time in parallel
+    regions.
     """
     k, begin = first, now(job, CLOCK)
     while k < end:
@@ -118,7 +119,7 @@ class Program:
         words = [each.words() if isinstance(each, Span) else _words(each) for each in stages]
         self._words = np.array(words, np.int64).reshape(-1, _WORDS)
         self.spent: Ints = np.zeros((len(stages), 2), np.int64)
-        """(stages, 2) time of each stage so far, ns: as a range with one task, and in parallel regions."""
+        """(stages, 2) wall time of each stage so far, ns: as a range with one task, and in parallel regions."""
         control[0] = -1
 
     def run(self, first: int = 0, end: int | None = None) -> int:
@@ -145,7 +146,7 @@ class Program:
         _repeat(self.spent, team.job, team.semaphore, self._words, self.control, 0, len(self._stages))
 
     def _timed(self, stage: Stage | Span) -> None:
-        """Run a stage while the times of tasks are measured (projecting.py)."""
+        """Run a stage and measure the times of its tasks (projecting.py)."""
         if isinstance(stage, Stage):
             self._team.run(stage.kernel, stage.table, stage.tasks, stage.starts)
         elif len(tasks := stage.tasks()):

@@ -1,11 +1,11 @@
 """Estimate of the time that parallel regions would take with more threads than the machine has cores.
 
-The tasks are run and timed one after the other; for each number of threads (crew) the tasks are assigned as a team
+The tasks are run and timed one after the other. For each number of threads (crew) the tasks are assigned as a team
 would assign them: colour by colour, the next task goes to the thread that is free first. The costs of parallel regions
-are measured before, with two threads; each colour costs the time ``turn``. After a pause, waking a thread costs the
-calling thread the time ``call``, and the woken thread begins to work after the time ``wake``. Each woken thread wakes
-two more threads (team.py); the estimate does not include that simultaneous tasks slow each other down by the memory
-that they share.
+are measured before, with two threads. Each colour costs the time ``turn``. After a pause, waking a thread takes the
+time ``call`` of the calling thread, and the woken thread begins to work after the time ``wake``. Each woken thread
+wakes two more threads (team.py). The estimate ignores that simultaneous tasks slow each other down by the memory that
+they share.
 """
 
 import time
@@ -20,12 +20,12 @@ from .team import Team
 from .words import TASK, call_task, now
 
 _PAUSE = 100_000
-"""Time after which threads without a task sleep, ns; chosen value: twice the time for which such threads poll
-(team.py)."""
+"""Time after which threads without a task sleep, ns. Chosen value: twice the time for which such threads read the task
+word in a loop (team.py)."""
 _REPEATS = 50
 _ROUNDS = 100_000
-"""Number of iterations of a task that takes longer than the waking of a thread; with the chosen value the task takes
-some 100 us."""
+"""Number of iterations of a task that takes longer than the waking of a thread. With the chosen value the task takes
+about 100 us."""
 _WORDS = types.int64[::1], types.int64
 _words = reader(*_WORDS)
 
@@ -37,7 +37,7 @@ def crews_of(threads: int) -> list[int]:
 
 @dataclass(frozen=True)
 class Costs:
-    """Costs of parallel regions, ns. The docstring of the module defines ``turn``, ``call`` and ``wake``."""
+    """Costs of parallel regions, ns. The docstring of this module defines ``turn``, ``call`` and ``wake``."""
 
     turn: int
     call: int
@@ -46,8 +46,8 @@ class Costs:
 
 @njit("void(boolean, int64[::1], int64[::1], int64[:, ::1])", cache=True)
 def _ready(asleep, costs, crews, free):  # type: ignore[no-untyped-def]
-    """Set the time at which each thread of each crew can begin the first task of a colour; the last column is the time
-    at which the last task of a crew ends.
+    """Set the time at which each thread of each crew can begin the first task of a colour. The last column is the time
+    at which the last task of the crew ends.
     """
     for c in range(len(crews)):
         free[c, : crews[c]] = 0
@@ -99,8 +99,8 @@ class Projecting:
     """Runs the tasks of parallel regions one after the other. Sums the time that crews of other sizes would take."""
 
     def __init__(self, threads: int, costs: Costs | None = None) -> None:
-        """``threads``: size of the largest crew; ``costs``: costs of parallel regions. If the costs are not given, they
-        are measured.
+        """``threads``: size of the largest crew; ``costs``: costs of parallel regions. If the costs are not given, the
+        object measures them.
         """
         self.crews = crews_of(threads)
         self.costs = costs or measured()

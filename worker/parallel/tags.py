@@ -1,7 +1,8 @@
 """Tags of the messages between two ranks.
 
-Two exchanges that may be in progress at the same time never have the same tag; all trades have one tag, because
-messages between two ranks arrive in the order in which they were sent, and the two ranks trade in the same order.
+Two exchanges that may be in progress at the same time never have the same tag. All calls of ``trade`` use one tag:
+messages between two ranks arrive in the order in which they were sent, and the two ranks make the calls in the same
+order.
 """
 
 from enum import IntEnum, unique
@@ -52,6 +53,6 @@ class Tag(IntEnum):
     """Positions and velocities of tied nodes that this rank does not have, in every step with bonds of meshes that do
     not match (bonds/layout.py)."""
     SWAP = 90
-    """Words whose number is not known; the number is exchanged first (parallel/mpi.py)."""
+    """Words whose number the receiver does not know in advance; the number is exchanged first (parallel/mpi.py)."""
     TRADE = 91
     """Words between two partners that have both planned the message (parallel/mpi.py)."""

@@ -1,17 +1,17 @@
 """The threads of a rank. A pass is cut into tasks, and the next free thread takes the next task.
 
 A task is a range of a pass: a range of chunks of tets, or of nodes. Tasks of one colour write to no common memory, so
-threads need no locks and no separate sums; colours run one after the other. All sums are of integers, so the answer is
-the same on any number of threads.
+threads need no locks and no separate sums. The colours run one after the other. All sums are of integers, so the answer
+is the same on any number of threads.
 
 The calling thread also runs tasks; the other threads are called helpers. At the end of a pass the calling thread waits
 for the tasks that have begun, not for threads. If another program uses the core of a helper, the other threads run the
 tasks. OpenMP would wait for every thread at the end of every parallel region, which takes milliseconds in that case
-(docs/performance/scaling.md, "Threads"). One word has the number of tasks and the index of the next task. A thread
-takes a task by an atomic increment of the word. A colour does not end before its last task, so the arguments of a task
-stay valid. Helpers poll the word for some 50 us, then sleep until the next pass. To wake a thread takes some 20 us of
-the time of another thread. Therefore the calling thread wakes one or two threads, and each woken thread wakes two more
-threads while there are tasks.
+(docs/performance/scaling.md, "Threads"). One word of memory contains the number of tasks and the index of the next
+task. A thread takes a task by an atomic increment of the word. A colour does not end before its last task, so the
+arguments of a task stay valid. Helpers read this word in a loop for about 50 us, then they sleep until the next pass.
+Waking a thread takes about 20 us of the time of another thread. Therefore the calling thread wakes one or two threads,
+and each woken thread wakes two more threads while there are tasks.
 """
 
 import ctypes
@@ -46,8 +46,9 @@ _LINE = 8
 _WAKES = 2
 """Largest number of threads that one thread wakes."""
 _POLLS = 4000
-"""Number of polls before a helper sleeps, and before the calling thread yields its core; with the chosen value polling
-takes some 50 us, which is longer than the gap between two colours and much shorter than a step."""
+"""Number of reads of the task word before a helper sleeps, and before the calling thread yields its core. With the
+chosen value the reads take about 50 us, which is longer than the gap between two colours and much shorter than a
+step."""
 
 
 @njit("boolean(int64[::1], int64)", cache=True)
@@ -109,7 +110,7 @@ def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64, int64)", cache=True)
 def divide(job, semaphore, many):  # type: ignore[no-untyped-def]
-    """Run ``many`` tasks of the pass that the words of the job describe. Return when all tasks are done."""
+    """Run ``many`` tasks of the pass that is described by the words of the job. Return when all tasks are done."""
     swap(job, _DONE, 0)
     swap(job, _NEXT, many << _BITS)
     if many > 1:
@@ -159,7 +160,7 @@ class Stage:
     tasks: Ints
     starts: Ints
     ties: tuple[Tie, ...] = ()
-    """Words of the table of arguments that change with numbers of the program."""
+    """Words of the argument table that change with numbers of the program."""
 
 
 class Timed(Protocol):
@@ -197,7 +198,7 @@ class Team:
 
     @property
     def most(self) -> int:
-        """Number of threads that may work."""
+        """Number of threads that may run tasks."""
         return int(self._words[MOST])
 
     @most.setter
@@ -206,12 +207,12 @@ class Team:
 
     @property
     def within(self) -> float:
-        """Wall time in ``run`` so far, s; more threads would shorten this time."""
+        """Wall time in ``run`` so far, s. More threads would shorten this time."""
         return self._words[WITHIN] / SECOND
 
     @property
     def helped(self) -> float:
-        """Time in tasks of all threads except the calling thread, summed over these threads, s."""
+        """Time that all threads except the calling thread have spent in tasks, summed over these threads, s."""
         return float(self.job[_THREADS + _LINE :: _LINE].sum()) / SECOND
 
     def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> None:

@@ -1,4 +1,4 @@
-"""Atomic words, the clock, and calls of the C library, for use in kernels."""
+"""Atomic words, the clock, and calls of the C library, for kernels."""
 
 from typing import Any
 
@@ -86,7 +86,7 @@ def _read_clock(_: Any, words: Any, at: Any) -> Any:
 
 
 def _library(name: str, signature: Any) -> Any:
-    """Return a call of a function of the C library. Callers ignore the result of the function."""
+    """Return a call of a function of the C library for kernels. Callers ignore the result of the function."""
 
     def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.FunctionType(ir.IntType(32), [_WORD] * len(args))

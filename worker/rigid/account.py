@@ -12,7 +12,7 @@ _KEPT = {
     "contact_loss": "contact_loss", "external_work": "external_work", "friction_loss": "friction_loss",
     "bond_loss": "bond_loss", "_later": "later", "_before": "before",
 }  # fmt: skip
-"""Names of the sums in a checkpoint, and names of the attributes that have the sums."""
+"""Names of the sums in a checkpoint, and names of the attributes that contain the sums."""
 
 
 class BodyAccount:
@@ -28,7 +28,7 @@ class BodyAccount:
         self.later = np.zeros((4, bodies.n))
         """(4, b) second halves of the four energies in the last step, J."""
         self.before = np.stack([bodies.speed, bodies.momentum])
-        """(2, b, 3) v(n-1/2), m/s, and angular momentum at n-1/2, kg m^2/s."""
+        """(2, b, 3) velocity v(n-1/2), m/s, and angular momentum at n-1/2, kg m^2/s, of each body."""
 
     def keep(self) -> dict[str, Any]:
         """Returns the state of the account for a checkpoint."""
@@ -86,8 +86,8 @@ class BodyAccount:
         return np.asarray(0.5 * (linear + dot(momentum, bodies.rates(bodies.momentum))))
 
     def quantity(self, body: int, field: str, axis: int, share: float) -> float:
-        """Returns the kinetic energy of a body, J, or a component of ``momentum``, ``centre`` or ``centre_velocity``;
-        the result contains the fraction ``share`` of the change by the last impulses.
+        """Returns the kinetic energy of a body, J, or a component of ``momentum``, ``centre`` or ``centre_velocity``.
+        The last impulses have changed this value; the result contains the fraction ``share`` of the change.
         """
         bodies, (speed, momentum) = self._bodies, self.before
         if field == "centre":

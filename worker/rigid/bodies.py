@@ -14,7 +14,7 @@ from . import rotation
 from .motion import Held
 
 STATE = ("centre", "q", "speed", "momentum")
-"""Names of the quantities that change from step to step."""
+"""Names of the quantities of bodies that change from step to step."""
 
 
 @dataclass
@@ -30,28 +30,28 @@ class Bodies:
     inertia: Floats
     """(b, 3, 3) inertia about the centre of mass, along the axes of the case, at the start, kg m^2."""
     reach: Floats
-    """(b,) reach of each body: a power of two above the largest distance of a node from the centre, m. The quantum of
-    moments is the quantum of impulses times the reach."""
+    """(b,) reach of each body: a power of two that is larger than the greatest distance of a node from the centre, m.
+    The quantum of moments is the quantum of impulses multiplied by the reach."""
     held: list[Held]
 
     def __post_init__(self) -> None:
         """Sets all bodies to rest in their initial position."""
         n = len(self.part)
         self.centre, self.speed, self.momentum = self.origin.copy(), np.zeros((n, 3)), np.zeros((n, 3))
-        """Centre of mass, m. Then values at mid-step: velocity of the centre, m/s, and angular momentum about the
-        centre, kg m^2/s."""
+        """Three values of each body: centre of mass, m; velocity of the centre at mid-step, m/s; and angular momentum
+        about the centre at mid-step, kg m^2/s."""
         self.q = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
         """(b, 4) unit quaternion of the rotation from the start, scalar first."""
         self.inverse = np.array([inverse(tensor) for tensor in self.inertia]).reshape(n, 3, 3)
         self.rotation, self.compliance = np.empty((n, 3, 3)), np.empty((n, 3, 3))
         """(b, 3, 3) present rotation; and inverse of the inertia along the axes of space. If a body can turn about one
-        axis only, the inverse is that of the inertia about this axis."""
+        axis only, it is the inverse of the inertia about this axis."""
         self.free = np.array([each.free for each in self.held]).reshape(n, 3)
         self.turns = np.array([each.turns for each in self.held]).reshape(n, 3)
         """(b, 3) 1 for an axis along which impulses may move the body, else 0. Then (b, 3) 1 for an axis about which
         impulses may rotate the body, else 0."""
         self.loose = np.flatnonzero(self.turns.all(axis=1))
-        """Indices of the bodies that can turn about any axis."""
+        """Indices of the bodies that can turn about all axes."""
         self.lightness = self.free / self.mass[:, None]
         self.pose()
 
@@ -79,7 +79,7 @@ class Bodies:
         return np.asarray(found[0])
 
     def rates(self, momentum: Floats) -> Floats:
-        """Returns the rotation vectors (b, 3), rad/s, that belong to angular momenta."""
+        """Returns the rotation vectors (b, 3), rad/s, of bodies with the given angular momenta."""
         return times(self.compliance, momentum)
 
 
@@ -132,8 +132,8 @@ def measured(case: Case, nodes: Nodes, held: list[Held], comm: Comm) -> Bodies:
 
 
 def _measured(part: Part, nodes: Nodes, chosen: Flags, comm: Comm) -> tuple[float, Floats, Floats, float]:
-    """Returns four properties of a body with the nodes ``chosen``: mass, kg, centre of mass, m, inertia about this
-    centre, kg m^2, and reach, m. Collective.
+    """Returns four properties of a body that consists of the nodes ``chosen``: mass, kg, centre of mass, m, inertia
+    about this centre, kg m^2, and reach, m. Collective.
     """
     spec, some = part.rigid, chosen & nodes.owned
     assert spec is not None

@@ -4,8 +4,9 @@ the bodies.
 In each sweep of the bonds (bonds/sweeps.py) the impulses on the points of a body, and their moments about the centre of
 the body, are summed as integers over the ranks. The sums of the impulses change the motion of the body, and the
 velocities of the points are set to this motion. In a step a point moves along the chord of its arc. Therefore a tied
-row uses arm and rotation vector at mid-step, V + (w + dt/2 w') x (r + dt/2 w x r), where w' = W (l x w) is that of a
-free rotation.
+row uses the arm r and the rotation vector w at mid-step: the velocity of the point is V + (w + dt/2 w') x (r + dt/2 w x
+r). Here V is the velocity of the centre, and w' = W (l x w) is the rate of change of w in a free rotation with the
+angular momentum l and the inverse inertia W.
 """
 
 import numpy as np
@@ -70,7 +71,7 @@ class BodyBonds:
 
     def give(self, v: Floats, words: Ints, *, walls: bool) -> None:
         """Moves the bodies, and the points in ``v`` (n, 3), after a sweep. ``words`` (n, 3): impulses of the sweep on
-        the nodes of the table, quanta; ``walls``: whether walls stop the bodies. Collective.
+        the nodes of the table, quanta; ``walls``: True if walls stop the bodies. Collective.
         """
         bodies, sums = self._bodies, np.zeros((self._bodies.n, WORDS), np.int64)
         gather(sums, words, self._places, self._points.body, self._arms, bodies.reach)

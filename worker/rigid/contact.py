@@ -28,7 +28,7 @@ class _Slots(NamedTuple):
     arm: Floats
     """(k, 3) vector from the centre of the body to each slot, m."""
     owned: Flags
-    """(k,) whether this rank owns the node of each slot."""
+    """(k,) True for each slot whose node this rank owns."""
     node: Indices
     """(k,) local node of each slot; -1 if the node is not on this rank."""
     impulse: Ints
@@ -56,12 +56,13 @@ class BodyContacts:
     ) -> None:  # fmt: skip
         """``of_part`` (parts,): body of each part, -1 for none; ``start`` (2, b, 3): velocities and rotation vectors of
         the bodies before the impulses of the step; ``rate`` (b, 3): present rotation vectors, which this class updates;
-        ``reports``: whether ``add_pressed`` will be called.
+        ``reports``: True if the run will call ``add_pressed``.
         """
         self._bodies, self._stops, self._of_part, self._comm = bodies, stops, of_part, comm
         self._start, self._rate, self._reports = start, rate, reports
         self._total, self._scale = np.zeros((bodies.n, rows.WORDS), np.int64), 1.0
-        """(b, WORDS) contact impulses on each body in the step, quanta; and the number of quanta per N s."""
+        """(b, WORDS) contact impulses on each body in the step, quanta. The second value is the number of quanta per N
+        s."""
         self._changed: Ints = np.zeros((bodies.n, rows.WORDS), np.int64)
         """(b, WORDS) contact impulses on each body in the last sweep, quanta."""
         self.active = False
@@ -120,8 +121,8 @@ class BodyContacts:
         pressed[self._slots.node[mine]] += self._slots.impulse[mine]
 
     def unsettled(self) -> Ints:
-        """(2,) two l1 norms over all ranks, on rank 0: of the changes of impulses and moments in the last sweep, and of
-        the impulses and moments in the step (sweep_count.py in contact/solver).
+        """(2,) two l1 norms over all ranks, on rank 0. The first is that of the changes of impulses and moments in the
+        last sweep; the second is that of the impulses and moments in the step (sweep_count.py in contact/solver).
         """
         both = np.zeros(2, np.int64)
         if self._comm.rank == 0 and self.active:

@@ -24,19 +24,20 @@ class Held:
     """(3,) 1 for axes about which impulses may rotate the body, else 0; the values are 1 for all axes, for one axis, or
     for none."""
     driven: dict[int, tuple[float, Course]] = field(default_factory=dict)
-    """Prescribed velocity along an axis, m/s, and its factor over time, keyed by the axis."""
+    """Dictionary of prescribed velocities; the keys are axes. A value contains the velocity along the axis, m/s, and
+    its factor as a function of time."""
     spin: tuple[Floats, Floats] | None = None
-    """Point on the axis of a prescribed rotation, m, and the rotation vector, rad/s; None without prescribed
-    rotation."""
+    """Point on the axis of a prescribed rotation, m, and the rotation vector, rad/s; None if no rotation is
+    prescribed."""
     pulls: list[tuple[Floats, Course]] = field(default_factory=list)
-    """Accelerations of gravity, m/s^2, with their factors over time."""
+    """Accelerations of gravity, m/s^2, with their factors as functions of time."""
     prescribed: bool = False
     """True if any motion is prescribed. Walls do not stop a body with a prescribed motion."""
 
     @classmethod
     def of(cls, case: Case, part: Part, beside: Collection[int] = ()) -> "Held":
-        """Collects the boundaries that act on the ``part``. The symmetry planes beside which the part starts
-        (``beside``) are left out.
+        """Collects the boundaries that act on the ``part``. Symmetry planes beside which the part starts are left out;
+        ``beside`` marks them.
         """
         found = cls()
         for index, boundary in enumerate(case.boundaries):
@@ -76,11 +77,11 @@ class Held:
         return self._driven(speed, 0.0, 0.0), rate * self.turns
 
     def kept(self, momentum: Floats) -> Floats:
-        """(3,) an angular momentum without the components that the constraints exclude."""
+        """(3,) angular momentum without the components that the constraints exclude."""
         return momentum if self.spin is not None else momentum * self.turns
 
     def kick(self, speed: Floats, centre: Floats, last_dt: float, dt: float, t: float) -> Floats:
-        """(3,) v*(n+1/2) from v(n-1/2), m/s."""
+        """(3,) velocity v*(n+1/2), computed from v(n-1/2), m/s."""
         if self.spin is not None:
             return np.asarray((self.turned(centre, dt) - centre) / dt) if dt > 0.0 else speed
         gained = speed

@@ -14,7 +14,7 @@ from .bodies import Bodies
 
 @dataclass
 class Points:
-    """Points of rigid bodies; a tied row has at most one point."""
+    """Points of rigid bodies. A tied row has at most one point."""
 
     row: Ints
     """(k,) tied row of each point, ascending."""
@@ -32,7 +32,7 @@ class Points:
         return len(self.row)
 
     def take(self, chosen: Flags) -> "Points":
-        """Returns the chosen points."""
+        """Returns the points chosen by ``chosen``."""
         return Points(self.row[chosen], self.body[chosen], self.arm[chosen])
 
     def norms(self, bodies: Bodies) -> Floats:

@@ -17,7 +17,7 @@ import numpy as np
 from ..kernels.jit import njit
 
 _ENOUGH = 1e-16
-"""Relative change of the mean angular momentum at which the iteration ends."""
+"""Relative change of the mean angular momentum. The iteration ends when the change is smaller."""
 _MOST = 60
 """Largest number of fixed-point iterations. Each iteration multiplies the error by dt times the rate of precession,
 which is below a tenth (stage.py)."""
@@ -93,7 +93,8 @@ def _apply(out, tensor, b, vector):  # type: ignore[no-untyped-def]
 @njit("void(float64[:, ::1], int64, float64, float64, float64, boolean)", cache=True)
 def multiply(q, b, x, y, z, in_space):  # type: ignore[no-untyped-def]
     """Multiplies the quaternion ``q[b]`` by (1, x, y, z) and normalises it; this is a rotation about the axis (x, y, z)
-    by twice the arc tangent of its length. The axis is given in the body, or in space if ``in_space``.
+    by twice the arc tangent of its length. The components of the axis are given along the axes of the body, or along
+    the axes of space if ``in_space`` is True.
     """
     a, c, d, e = q[b, 0], q[b, 1], q[b, 2], q[b, 3]
     sign = -1.0 if in_space else 1.0
@@ -108,8 +109,8 @@ def multiply(q, b, x, y, z, in_space):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], int32[::1], int32[::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1])", cache=True)
 def place(x, nodes, body, arms, rotation, centre):  # type: ignore[no-untyped-def]
-    """Sets the positions ``x`` of the ``nodes`` (k,) of bodies to the initial ``arms`` (k, 3), rotated, plus the centre
-    of the body.
+    """Sets the positions ``x`` of the ``nodes`` (k,) of bodies. The position of a node is the centre of its body plus
+    the rotated initial arm, ``arms`` (k, 3).
     """
     for k in range(len(nodes)):
         a, b = nodes[k], body[k]

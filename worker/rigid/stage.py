@@ -53,16 +53,16 @@ class Rigid:
         self._arms = np.ascontiguousarray(nodes.x0[self.nodes] - bodies.origin[self._body])
         """(k, 3) arms (vectors from the centre of the body to the nodes) at the start, m."""
         self.of_part: Indices = np.full(len(case.parts), -1, np.int32)
-        """(parts,) body of each part; -1 if the part is not rigid."""
+        """(parts,) number of the body of each part; -1 if the part is not rigid."""
         self.of_part[case.rigid] = np.arange(len(case.rigid), dtype=np.int32)
         self.account = BodyAccount(bodies)
         self.last_dt = self.last_push = 0.0
-        """Last time step, s; and time of the last impulse of contact or a wall, s."""
+        """Last time step, s; and simulated time of the last impulse of contact or a wall, s."""
         self._least = RIGID_STEPS / case.run.end_time if len(case.rigid) == len(case.parts) else 0.0
         self._start, self._rate = np.zeros((2, bodies.n, 3)), np.zeros((bodies.n, 3))
         """Velocities and rotation vectors before the impulses of the step; and present rotation vectors, rad/s."""
         self.share = 1.0
-        """Fraction of the last change of the motion that the velocities of the nodes contain; it is below 1 at the end
+        """Fraction of the last change of the motion that the velocities of the nodes contain. It is below 1 at the end
         of a run, when velocities are interpolated to n."""
         self.stops = BodyStops(
             walls, bodies, *stopped(case, nodes, bodies, beside, comm), _restitution(case, walls), _names(case)
@@ -94,7 +94,7 @@ class Rigid:
 
     @staticmethod
     def kept_bodies(known: dict[str, Any], held: list[Any]) -> Bodies:
-        """Returns the bodies of a run that resumes; ``known``: state in the checkpoint."""
+        """Returns the bodies of a resumed run; ``known``: state in the checkpoint."""
         bodies = Bodies(**known["constant"], held=held)
         for name, values in known["state"].items():
             setattr(bodies, name, values.copy())
@@ -110,13 +110,13 @@ class Rigid:
         self.stops.given[:] = known["given"]
 
     def words(self) -> bytes:
-        """Returns values for the digest: positions and motion of the bodies."""
+        """Returns the values of the bodies for the digest: positions and motion."""
         return b"".join(np.ascontiguousarray(getattr(self.bodies, name)).tobytes() for name in STATE)
 
     @property
     def limit(self) -> float:
-        """Returns 1 / longest allowed step, 1/s. No body may turn by more than _TURN in a step, and a run with rigid
-        parts only makes RIGID_STEPS steps.
+        """Returns 1 / longest allowed step, 1/s. No body may turn by more than _TURN in a step. A run that has only
+        rigid parts makes RIGID_STEPS steps.
         """
         rate = self.bodies.rates(self.bodies.momentum)
         return max(float(np.sqrt(dot(rate, rate)).max(initial=0.0)) / _TURN, self._least)

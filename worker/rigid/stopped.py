@@ -10,9 +10,9 @@ from .bodies import Bodies, of_nodes
 
 
 def stopped(case: Case, nodes: Nodes, bodies: Bodies, beside: Ints, comm: Comm) -> tuple[Flags, Floats, Indices]:
-    """Returns (walls, b) whether each wall stops each body; the walls of the case are followed by the two sides of each
-    symmetry plane. Also returns, for all nodes of stopped bodies on all ranks, ordered by id, the initial arm, m, and
-    the body. ``beside`` (planes, parts): side on which a body starts, 1 or -1. Collective.
+    """Returns (walls, b) flags: True if the wall stops the body. The walls of the case are followed by the two sides of
+    each symmetry plane. Also returns, for all nodes of stopped bodies on all ranks, ordered by id, the initial arm, m,
+    and the body. ``beside`` (planes, parts): side on which a body starts, 1 or -1. Collective.
     """
     held = np.concatenate([_by_walls(case, bodies), _by_planes(case, bodies, beside)])
     held &= np.array([not each.prescribed for each in bodies.held], bool)

@@ -26,12 +26,13 @@ from ..model.state import Flags, Floats, Indices, Ints
 from .bodies import Bodies, dot
 
 _NEAR = 2.0
-"""Ratio of a distance to the motion of a body in a step; the walls within this distance of the body are checked."""
+"""Factor that is multiplied by the motion of a body in a step. Walls within this distance of the body are checked."""
 _CLOSE = 1e-3
-"""Length, divided by the reach of a body. The length is added to the distance within which walls are checked; if a node
+"""Length, divided by the reach of a body. The length is added to the distance within which walls are checked. If a node
 ends deeper than this length behind a wall, the run ends."""
 _MOST, _ENOUGH = 200, 1e-12
-"""Largest number of passes over the rows; and relative change of an impulse at which the passes end."""
+"""Largest number of passes over the rows; and relative change of an impulse. The passes end when all changes are
+smaller."""
 
 
 class Rows(NamedTuple):
@@ -71,9 +72,9 @@ class BodyStops:
         self, walls: Walls, bodies: Bodies, held: Flags, arms: Floats, body: Indices, restitution: Floats,
         names: list[str],
     ) -> None:  # fmt: skip
-        """``held`` (walls, b): whether each wall stops each body. ``arms`` (k, 3): arms of all surface nodes at the
-        start, m; ``body`` (k,): bodies of these nodes. ``restitution`` (walls,): coefficients; ``names`` (b,): names of
-        the parts.
+        """``held`` (walls, b): True if the wall stops the body. ``arms`` (k, 3): arms of all surface nodes at the
+        start, m; ``body`` (k,): bodies of these nodes. ``restitution`` (walls,): coefficients of restitution; ``names``
+        (b,): names of the parts.
         """
         self._restitution, self._names = restitution, names
         self.walls, self._bodies, self._held, self._arms, self._body = walls, bodies, held, arms, body
@@ -82,10 +83,11 @@ class BodyStops:
         self.given = np.zeros((walls.n, bodies.n, 3))
         """(walls, b, 3) sum of the impulses of each wall on each body so far, N s."""
         self.impulse, self.rubbed = np.zeros((2, bodies.n, 6))
-        """(b, 6) impulse, N s, and moment, N m s, of the walls on each body in the step; and the part of each that is
-        friction."""
+        """(b, 6) impulse, N s, and moment, N m s, of the walls on each body in the step; and the part of these that is
+        due to friction."""
         self.of_walls, self.rubbed_by = np.zeros((2, walls.n, bodies.n, 3))
-        """(walls, b, 3) impulse of each wall on each body in the step, N s; and the part of it that is friction."""
+        """(walls, b, 3) impulse of each wall on each body in the step, N s; and the part of it that is due to
+        friction."""
 
     def begin(self, dt: float) -> None:
         """Finds the pairs of a node and a wall for a step of length ``dt``, s; positions are those of n, velocities

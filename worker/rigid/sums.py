@@ -20,7 +20,7 @@ def of_bonds(rigid: Rigid | None) -> list[float]:
 def add_undeformed(sums: Floats, of_parts: Floats, rigid: Rigid | None, walls: Walls) -> None:
     """Adds the values of rigid bodies and walls to ``sums`` (10,) over the nodes (accounts/nodal.py): kinetic energy,
     loss by contact and external work, J, momentum, kg m/s, the work of unequal steps (zero here), and angular momentum,
-    kg m^2/s. Adds the kinetic energy also to that of each part, ``of_parts`` (parts, .).
+    kg m^2/s. Also adds the kinetic energy to the energy of each part, ``of_parts`` (parts, .).
     """
     if rigid is None and not walls.lightness.any():
         return
