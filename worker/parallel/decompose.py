@@ -122,7 +122,7 @@ def bisect(
 
 
 def place(cuts: list[Cut], points: Floats) -> Indices:
-    """Return (n,) the part to which each of the points (n, 3) belongs. The points are not among those from which the
+    """Return (n,) the part to which each of the points (n, 3) belongs. The points need not be those from which the
     cuts were made.
     """
     owner, none = np.zeros(len(points), np.int32), np.zeros(len(points), np.int64)
