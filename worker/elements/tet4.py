@@ -24,6 +24,8 @@ version.
 from ..kernels.jit import njit, prefetch
 from ..model.rows import TET_VOLUME
 from ..model.state import CHUNK
+from . import corners
+from .corners import FOUR
 from .scratch import (
     AREAS,
     D_XX,
@@ -64,16 +66,18 @@ def gather(rows, values, tets, ahead, n):  # type: ignore[no-untyped-def]
     With positions the result is the edges, in the rows from EDGE on; with velocities it is the velocity differences, in
     the rows from RATE on. ``ahead``: state rows to be prefetched into the cache, or an empty array.
     """
-    first, second, third = rows, rows[3 * CHUNK :], rows[6 * CHUNK :]
-    near = len(ahead) // CHUNK
-    for i in range(n):
-        _prefetch_tet(ahead, i, near)
+    near, whole = len(ahead) // CHUNK, n // FOUR * FOUR
+    for i in range(0, whole, FOUR):
+        for k in range(FOUR):
+            _prefetch_tet(ahead, i + k, near)
+        corners.gather(rows, values, tets, i)
+    for i in range(whole, n):
         a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
         for k in range(3):
             origin = values[a, k]
-            first[k * CHUNK + i] = values[b, k] - origin
-            second[k * CHUNK + i] = values[c, k] - origin
-            third[k * CHUNK + i] = values[d, k] - origin
+            rows[k * CHUNK + i] = values[b, k] - origin
+            rows[(3 + k) * CHUNK + i] = values[c, k] - origin
+            rows[(6 + k) * CHUNK + i] = values[d, k] - origin
 
 
 @njit(
@@ -84,16 +88,19 @@ def gather(rows, values, tets, ahead, n):  # type: ignore[no-untyped-def]
 def gather_moved(w, x0, x, tets, ahead, n):  # type: ignore[no-untyped-def]
     """Sets EDGE to the edges, and MOVED to the displacements of nodes 1, 2, 3 less the displacement of node 0.
     ``ahead``: see ``gather``.
-
-    The two groups of nine rows are written one after the other, because a processor cannot store 18 streams at once at
-    full speed.
     """
-    gather(w[EDGE:], x, tets, ahead, n)
-    gather(w[MOVED:], x0, tets, ahead[:0], n)
-    for k in range(9):
-        edge, moved = w[EDGE + k * CHUNK :], w[MOVED + k * CHUNK :]
-        for i in range(n):
-            moved[i] = edge[i] - moved[i]
+    near, whole = len(ahead) // CHUNK, n // FOUR * FOUR
+    for i in range(0, whole, FOUR):
+        for k in range(FOUR):
+            _prefetch_tet(ahead, i + k, near)
+        corners.gather_moved(w, x0, x, tets, i)
+    for i in range(whole, n):
+        for j in range(3):
+            a, b = tets[i, 0], tets[i, j + 1]
+            for k in range(3):
+                row = (3 * j + k) * CHUNK + i
+                w[EDGE + row] = x[b, k] - x[a, k]
+                w[MOVED + row] = w[EDGE + row] - (x0[b, k] - x0[a, k])
 
 
 @njit("UniTuple(float64, 9)(float64[::1], int64)", cache=True, error_model="numpy", forceinline=True)
