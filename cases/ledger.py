@@ -28,8 +28,8 @@ class Energy(msgspec.Struct, kw_only=True, frozen=True):
     changes have added energy."""
     averaging: float = 0.0
     """Work of the averaged nodal pressures, only with the pressure forms ``nodal`` and ``split``. This work is stored
-    in the pressure differences between tets and nodes. It is dissipated if neighbouring tets yield or fail at different
-    times."""
+    in the pressure differences between tets and nodes. Work that averaged pressures have stored is dissipated if
+    neighbouring tets yield or fail at different times."""
     external: float
     initial: float
     residual: float

@@ -236,7 +236,7 @@ class Log(Message, frozen=True):
 
 
 class Finished(Message, frozen=True):
-    """Message: the outcome of the run is on disk. It is the last message of a worker process."""
+    """Message: the outcome of the run is on disk. ``Finished`` is the last message of a worker process."""
 
     state: str
     digest: str

@@ -102,7 +102,8 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """CPU time of all ranks and their threads in the loop over the time steps, s; a thread counts only while it works.
     """
     digest: str = ""
-    """SHA-256 of the state of all nodes and tets in the order of their global ids. It is equal for any number of ranks.
+    """SHA-256 of the state of all nodes and tets in the order of their global ids. The digest is equal for any number
+    of ranks.
     """
     elements: int | None = None
     eroded: int | None = None

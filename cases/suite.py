@@ -31,7 +31,7 @@ class Hard:
     """Limit of the energy residual of the case."""
     refused: str = ""
     """Term of the energy ledger that is expected to create more energy than ``run.made_limit`` allows, so that the run
-    fails. Empty: the run must succeed."""
+    fails. If ``refused`` is empty, the run must succeed."""
 
     @property
     def path(self) -> Path:

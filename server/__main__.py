@@ -1,5 +1,5 @@
-"""``python -m conoid.server``: runs the server. The command ``token add | list | revoke`` manages access; the command
-``adopt`` registers a folder of runs that was moved or restored.
+"""``python -m conoid.server``: runs the server. ``token add | list | revoke`` manages the access to the server.
+``adopt`` registers a folder of runs that was moved or restored from a backup.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from .settings import Caps, Settings, SettingsError, StartError, capped, command
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command line and returns the exit code: 0 for success, 2 for a wrong command line, 1 for any other
-    failure. A failure prints one line of text for people.
+    failure. A failure prints one line of text.
     """
     options = _parser().parse_args(arguments)
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.INFO)
@@ -158,7 +158,7 @@ def _check_programs(settings: Settings) -> None:
 
 
 def _untouched(settings: Settings) -> bool:
-    """Whether the folder of runs has no database yet: neither a server nor ``token add`` has used the folder."""
+    """Whether the folder of runs has no database yet: no server has used it, and no token was added."""
     return not settings.database and not settings.database_file.exists()
 
 
@@ -191,8 +191,8 @@ def _add(options: argparse.Namespace) -> None:
 
 
 def _adopt(options: argparse.Namespace) -> None:
-    """Binds the folder of runs to its database. Raises SettingsError if another server uses the folder of runs, or if
-    the folder does not exist.
+    """Binds the folder of runs and its database to each other. Raises SettingsError if another server uses the folder
+    of runs, or if the folder does not exist.
     """
     settings = _settings(options)
     if not settings.runs.is_dir():

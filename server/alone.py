@@ -17,9 +17,9 @@ class AloneError(StartError):
 
 @contextmanager
 def only_one(runs: Path) -> Iterator[None]:
-    """Takes the lock of a folder of runs. Without the lock, two servers on one folder would start every run twice. The
-    lock of the folder itself is needed because a lock file could be deleted; the lock file is needed for file systems
-    that cannot lock folders.
+    """Takes the lock of a folder of runs. Two servers with the same folder would start every run twice. Both the folder
+    of runs and a lock file in the folder are locked: a lock file alone could be deleted, and some file systems cannot
+    lock folders.
     """
     with ExitStack() as stack:
         folder = os.open(runs, os.O_RDONLY | os.O_DIRECTORY)

@@ -86,8 +86,8 @@ _SAFE_HEADERS = {
 
 @contextmanager
 def opened(settings: Settings) -> Iterator[Service]:
-    """Opens the parts of a server in the order of their dependence, the supervisor last; closes the parts in reverse
-    order. Workers continue after the server is closed. Raises StoreError, IdentityError, TelemetryError or OSError.
+    """Opens the parts of a server, each after the parts that it uses; closes the parts in reverse order. Workers
+    continue after the server has been closed. Raises StoreError, IdentityError, TelemetryError or OSError.
     """
     settings.runs.mkdir(0o700, parents=True, exist_ok=True)
     with ExitStack() as stack:
@@ -149,13 +149,13 @@ def opened(settings: Settings) -> Iterator[Service]:
 
 
 def launcher_of(settings: Settings) -> Launcher:
-    """Returns the launcher of the site's settings."""
+    """Returns the launcher that the settings of the site select."""
     site = settings.site
     return SlurmLauncher(settings, site.slurm) if site.launcher == "slurm" and site.slurm else LocalLauncher(settings)
 
 
 def build_app(service: Service) -> FastAPI:
-    """Returns the FastAPI application for parts that are open."""
+    """Returns the FastAPI application for a server whose parts are open."""
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -190,7 +190,7 @@ def build_app(service: Service) -> FastAPI:
 
 
 class _SafeHeaders:
-    """Middleware that adds security headers to every answer; streamed answers are sent unchanged."""
+    """Middleware that adds security headers to every answer."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

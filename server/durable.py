@@ -1,5 +1,5 @@
-"""Writing of files that survives a power failure: first the data is flushed to disk, then the name of the file, then
-the folder of the file.
+"""Writing of files so that they survive a power failure: the data is flushed to disk, then the file gets its name, then
+the folder is flushed.
 """
 
 import os
@@ -9,7 +9,7 @@ from pathlib import Path
 from conoid.cases.reading import whole
 
 _PROBE = 1 << 16
-"""Number of bytes that are written to test whether a folder can be written (chosen value)."""
+"""Number of bytes that a test writes to find out whether a folder can be written (chosen value)."""
 
 
 def write(path: Path, content: bytes, mode: int = 0o600) -> None:

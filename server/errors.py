@@ -31,9 +31,7 @@ _CODES = {400: "bad_request", 401: "unauthorized", 404: "not_found", 405: "metho
 
 
 class ServiceError(Exception):
-    """An HTTP answer with an error. The field ``detail`` is one line for people; ``code`` is a constant word for
-    programs.
-    """
+    """An HTTP answer with an error. ``detail``: a text of one line for users; ``code``: a fixed word for programs."""
 
     def __init__(
         self,
@@ -48,8 +46,8 @@ class ServiceError(Exception):
         headers: Mapping[str, str] | None = None,
         outcome: Mapping[str, Any] | None = None,
     ) -> None:
-        """Creates the error. ``pointer``: a JSON pointer into the request body, or the name of a parameter or header;
-        ``outcome``: the stored record of a removed run.
+        """Creates the exception. ``pointer``: JSON pointer into the request body, or name of a parameter or header;
+        ``outcome``: the record of a run that was removed.
         """
         super().__init__(detail)
         self.status, self.headers = status, dict(headers or {})
@@ -77,8 +75,8 @@ class ServiceError(Exception):
 
 
 def invalid_case(problems: Sequence[Problem]) -> ServiceError:
-    """Returns an answer with status 422 and every problem of the case; ``detail`` and ``pointer`` are the fields of the
-    first problem.
+    """Returns the error with status 422 for a case; ``detail`` and ``pointer`` describe its first problem, ``errors``
+    lists all problems.
     """
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     first = problems[0]
@@ -88,7 +86,7 @@ def invalid_case(problems: Sequence[Problem]) -> ServiceError:
 
 
 def not_found(what: str) -> ServiceError:
-    """Returns an answer with status 404; the text is the same for an unknown run and for a run of another user."""
+    """Returns the error with status 404. The text is the same for an unknown run and for a run of another user."""
     return ServiceError(404, "not_found", f"{what}: there is none")
 
 
@@ -108,7 +106,7 @@ def json_pointer(key: str) -> str:
 
 
 def install(app: FastAPI) -> None:
-    """Answers every error of ``app`` as problem+json."""
+    """Registers handlers with which ``app`` answers every error as problem+json."""
     app.add_exception_handler(ServiceError, _service_error)
     app.add_exception_handler(HTTPException, _http_error)
     app.add_exception_handler(RequestValidationError, _parameter_error)
@@ -133,7 +131,7 @@ async def _http_error(request: Request, error: Exception) -> Response:
 
 
 def allowed(app: FastAPI, path: str) -> str:
-    """Returns the HTTP methods of all routes for a path. If the patterns of several routes match the path, the longest
+    """Returns the HTTP methods of the routes for a path. If the patterns of several routes match the path, the longest
     pattern counts. The result is empty if no route matches the path.
     """
     found: dict[str, set[str]] = {}
@@ -154,7 +152,7 @@ async def _parameter_error(_: Request, error: Exception) -> Response:
 
 
 async def _storage(request: Request, error: Exception) -> Response:
-    """Returns the error for a file that cannot be read now, or is damaged."""
+    """Answers an error of the operating system: a file cannot be read at present, or is damaged."""
     assert isinstance(error, OSError)
     _log.error("%s %s: %s", request.method, request.url.path, error)
     detail = f"a file of the run cannot be used: {error.strerror or error}"
@@ -162,7 +160,7 @@ async def _storage(request: Request, error: Exception) -> Response:
 
 
 async def _database(request: Request, error: Exception) -> Response:
-    """Returns the error for a database that is locked by another process, full, or not reachable. The client may repeat
+    """Answers an error of the database: it is locked by another process, full, or not reachable. The client may repeat
     the request later.
     """
     _log.error("%s %s: the database cannot be used: %s", request.method, request.url.path, error)
@@ -170,7 +168,7 @@ async def _database(request: Request, error: Exception) -> Response:
 
 
 def database_away(error: Exception) -> ServiceError:
-    """Returns the status of a failed write: 507 for a full disk, 503 for any other error."""
+    """Returns the error for a database that cannot be used: status 507 for a full disk, 503 for any other cause."""
     reason = str(error).splitlines()[0]
     if "disk is full" in reason:
         return ServiceError(507, "storage", "the disk of the server's database is full", retryable=True)
@@ -179,7 +177,7 @@ def database_away(error: Exception) -> ServiceError:
 
 
 async def _crash(request: Request, error: Exception) -> Response:
-    """Returns an answer with status 500; the log of the server has the traceback."""
+    """Answers an unexpected exception with status 500; the log of the server contains the traceback."""
     _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
     detail = "the server failed to answer; its log has the reason"
     return ServiceError(500, "internal", detail, retryable=True).response()

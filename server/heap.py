@@ -6,18 +6,18 @@ import sys
 _ARENA_MAX, _MMAP_THRESHOLD = -8, -3
 """Parameters of mallopt(3) of glibc."""
 _HEAPS = 2
-"""Number of heaps of the C library for all threads. Python runs one thread at a time, and a smaller number of heaps did
-not change the CPU time (measured)."""
+"""Number of heaps that all threads share. Python runs one thread at a time; fewer heaps than threads did not change the
+CPU time (measured)."""
 _LARGE = 256 << 10
 """Size in bytes from which a freed block returns to the operating system at once. Answers whose size grows with the run
-are larger than this limit (chosen value). Without a fixed limit, glibc would raise the limit to the size of the largest
-block so far."""
+are larger than this limit (chosen value). With a fixed limit, glibc does not raise it to the size of the largest block
+so far."""
 
 
 def share() -> bool:
-    """Limits the number of heaps of the C library; must be called before the first thread starts. Returns False if the
-    C library has no setting for the number of heaps. Without the limit each thread has a separate heap, which stays as
-    large as the largest answer of the thread.
+    """Limits the number of heaps of the C library. Call it before the first thread starts. Returns False if the C
+    library has no such setting. Without this limit each thread has a heap of its own, which stays as large as the
+    largest answer that the thread has made.
     """
     if not sys.platform.startswith("linux"):
         return False

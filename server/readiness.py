@@ -14,8 +14,8 @@ from .requests.thread_pool import ThreadPool
 from .settings import Settings
 
 _FRESH = 1.0
-"""Time in s for which the result of a check is used again (chosen value), because /readyz needs no token and each check
-writes to the disk."""
+"""Time in s for which the result of a check is used again: /readyz needs no token, and each check writes to the disk
+(chosen value)."""
 _LIMIT = 2.0
 """Time in s after which a check has failed; a disk that works answers within 0.1 s (reason of the chosen value)."""
 
@@ -32,8 +32,8 @@ class Readiness:
         }
 
     async def checks(self) -> dict[str, bool]:
-        """Results of the checks, by name: ``database``; ``runs``, whether files can be written; ``disk``, whether the
-        disk has the free space that the site reserves.
+        """Results of the checks by name. ``database``: the database can be written; ``runs``: the folder of the runs
+        can be written; ``disk``: the disk has the free space that the site reserves.
         """
         passed = await asyncio.gather(*(check.passes() for check in self._checks.values()))
         return dict(zip(self._checks, passed, strict=True))
@@ -60,7 +60,7 @@ class Readiness:
 
 
 class _Check:
-    """Makes one check in a separate thread; all simultaneous requests share the result of the check."""
+    """One check in a thread of its own; requests at the same time share its result."""
 
     def __init__(self, look: Callable[[], bool]) -> None:
         self._look, self._thread = look, ThreadPool(each=1, waiting=1, patience=_LIMIT, most=1)
@@ -68,8 +68,8 @@ class _Check:
         self._asked: asyncio.Task[None] | None = None
 
     async def passes(self) -> bool:
-        """Returns the result of a check, at most ``_FRESH`` s old; returns False if the check takes longer than
-        ``_LIMIT`` s.
+        """Returns the result of the check, at most ``_FRESH`` s old. A check that takes longer than ``_LIMIT`` s counts
+        as failed.
         """
         if time.monotonic() >= self._until:
             if self._asked is None or self._asked.done():

@@ -1,5 +1,5 @@
-"""The server as a process: one process for each folder of runs, its address in server.json, a clean end after
-SIGTERM.
+"""The server as a process: one process for each folder of runs. The server writes its address to server.json, and ends
+cleanly after SIGTERM.
 """
 
 import asyncio
@@ -25,12 +25,12 @@ from .settings import Settings, StartError
 _log = logging.getLogger("conoid.server")
 ADDRESS_FILE = "server.json"
 _AGAIN = 5.0
-"""Time in s after which a failed write of the server's address is tried again (chosen value)."""
+"""Time in s after which the server tries again to write its address (chosen value)."""
 _SWITCH = 0.001
-"""Time in s after which a computing thread must let another thread run: a fifth of Python's default (chosen value). The
-event loop waits for this time for each busy thread, several times in an answer."""
+"""Time in s after which a computing thread must let another thread run (chosen value); a fifth of the default of
+Python. The event loop waits this long for each computing thread, several times in an answer."""
 _FAREWELL = 3
-"""Longest time in s to wait for open requests when the server stops."""
+"""Largest time in s to wait for open requests when the server stops."""
 
 
 class ServeError(StartError):
@@ -38,7 +38,7 @@ class ServeError(StartError):
 
 
 def serve(settings: Settings) -> None:
-    """Runs the server until SIGTERM or SIGINT. Only the user of the server can read the files of the server and its
+    """Runs the server until SIGTERM or SIGINT. Only the user of the server may read the files of the server and of its
     workers. Raises ServeError, and the errors of the function ``opened``.
     """
     os.umask(0o077)
@@ -62,9 +62,9 @@ def _answer(settings: Settings, listener: socket.socket) -> None:
 
 
 class _Server(uvicorn.Server):
-    """Writes the address of the server when the server answers, and ends open streams before it waits for open
-    requests. On a full disk the server runs without server.json, so that runs can be read and removed. The file
-    server.json is written when the disk has space again.
+    """HTTP server that writes the address of the server once it answers, and that ends open streams before it waits for
+    open requests. If the disk is full, the server works without server.json, so that runs can be read and removed, and
+    writes the file when there is space again.
     """
 
     def __init__(self, service: Service) -> None:
@@ -102,7 +102,7 @@ class _Server(uvicorn.Server):
             await asyncio.sleep(_AGAIN)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Stores the reason why the server ended."""
+        """Stores the signal for which the server ends."""
         self._why = signal.Signals(sig).name
         super().handle_exit(sig, frame)
 
@@ -116,8 +116,8 @@ class _Server(uvicorn.Server):
 
 
 def announce(service: Service, listener: socket.socket, page_problem: str | None) -> bytes:
-    """Prints one line and, if there is a page, the address of the page; None: no page. Returns the content of the file
-    server.json.
+    """Prints a line about the server and, if there is a page, the address of the page. ``page_problem``: why the page
+    lacks its libraries; None: there is no page. Returns the content of the file server.json.
     """
     host, port = listener.getsockname()[:2]
     url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
@@ -135,14 +135,14 @@ def announce(service: Service, listener: socket.socket, page_problem: str | None
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> None:
-    """Handles the signal that uvicorn raises again after its shutdown: ends the process with code 0."""
+    """Ends the process with code 0 after uvicorn has raised its signal again."""
     raise SystemExit(0)
 
 
 @contextmanager
 def _listening(settings: Settings) -> Iterator[socket.socket]:
-    """Creates the socket with the protocol TCP given explicitly; otherwise asyncio keeps Nagle's algorithm, which
-    delays an answer by 40 ms.
+    """Opens the socket with TCP as its explicit protocol; otherwise asyncio does not switch off Nagle's algorithm,
+    which delays an answer by 40 ms.
     """
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP) as listener:

@@ -1,4 +1,4 @@
-"""Parts of a running server that the routes use; the module ``app`` creates the parts."""
+"""The parts of a running server that the routes use; the module ``app`` creates them."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -45,15 +45,14 @@ class Service:
     pool: ThreadPool
     """Pool of threads for the disk and the database."""
     readers: ThreadPool
-    """Pool of threads that wait for the reading of cases."""
+    """Pool of threads that wait while cases are read."""
     surveyors: ThreadPool
-    """Pool of threads for cases that may name files, and for restarts, whose case may name files. Reading a case with
-    files takes seconds."""
+    """Pool of threads for cases that may name files, and for restarts. Reading a case with files takes seconds."""
     sweepers: ThreadPool
-    """Pool of threads for sweeps, whose reading takes seconds; submissions of single runs do not wait for these
+    """Pool of threads for sweeps, whose cases take seconds to read; submissions of single runs do not wait for these
     threads."""
     reporters: Reporters
-    """Pool of threads for reports of runs, which take minutes."""
+    """Makes the reports of runs, which takes minutes."""
     sweeps: Sweeps
     searches: Searches
     uploads: Uploads

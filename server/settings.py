@@ -1,4 +1,4 @@
-"""Settings of a site: folder of runs, cores, start of workers, limits of a run."""
+"""Settings of a server: folder of runs, cores, start of workers, limits of a run."""
 
 import ipaddress
 import os
@@ -13,14 +13,14 @@ from conoid.cases.estimates.cores import usable_cores
 from conoid.cases.site.batch import Site, SiteError, read_site
 
 WORKER = (sys.executable, "-P", "-m", "mpi4py", "-m", "conoid.worker")
-"""Command of the worker after ``mpiexec -n N``. With ``-m mpi4py`` an exception of one rank ends all ranks."""
+"""Command of the worker after ``mpiexec -n N``. Because of ``-m mpi4py``, an exception of one rank ends all ranks."""
 
 
 class StartError(Exception):
-    """Error: the server or a command cannot do its work. The text of the error is one line for people."""
+    """Error: the server or one of its commands cannot work. The text of the error is one line for the user."""
 
     exit_code = 1
-    """Exit code of the command: 2 for a wrong request, 1 for any other failure, as for the client."""
+    """Exit code of the command: 2 for a wrong request, 1 for any other failure, as in the client."""
 
 
 class SettingsError(StartError):
@@ -38,26 +38,28 @@ def memory_bytes() -> int:
 
 @dataclass(frozen=True)
 class Caps:
-    """Limits of an accepted case, compared with the estimate of the case; None: no limit."""
+    """Limits of a case that may be submitted. The server compares the estimate of the case with these limits; None: no
+    limit.
+    """
 
     elements: int | None = 100_000_000
     steps: int | None = 100_000_000
     memory: int | None = field(default_factory=memory_bytes)
-    """Memory limit of all ranks together, bytes."""
+    """Largest memory of all ranks together, bytes."""
     core_seconds: float | None = None
     wall_time: float | None = None
-    """Limit of the wall time of a run, s. A case with a smaller ``run.max_wall_time`` is stopped at its own limit."""
+    """Largest wall time of a run, s. A case with a smaller ``run.max_wall_time`` is stopped at its own limit."""
     queued: int = 1000
-    """Largest number of open runs of one owner."""
+    """Largest number of runs of an owner that have not ended."""
     output_bytes: int | None = None
-    """Largest size in bytes of a run's folder; a larger run is stopped."""
+    """Largest size of the folder of a run, bytes; a run that exceeds it is stopped."""
     free_disk: int = 1 << 30
-    """Bytes that must be free on the disk of the runs' folder before a run is accepted."""
+    """Number of bytes that must be free on the disk of the runs before a run is accepted."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """All options of ``python -m conoid.server``. Raises SettingsError if the options do not fit together."""
+    """All options of ``python -m conoid.server``. Raises SettingsError if the options contradict each other."""
 
     runs: Path
     host: str = "127.0.0.1"
@@ -66,8 +68,8 @@ class Settings:
     zenoh_port: int | None = 7447
     """Port of Zenoh; 0: any free port; None: no Zenoh router, so that clients follow runs over SSE."""
     slots: int = field(default_factory=usable_cores)
-    """Largest number of cores that all runs together use at a time; a run uses its number of ranks times its number of
-    threads."""
+    """Largest number of cores that all runs together use at a time; a run uses the number of its ranks times the number
+    of its threads."""
     auth: bool = True
     web: Path | None = None
     """Folder of the live page, served at ``/``."""
@@ -83,7 +85,7 @@ class Settings:
     next server supervises them."""
     caps: Caps = field(default_factory=Caps)
     site: Site = field(default_factory=Site)
-    """Site settings: launcher, and profiles of batch systems."""
+    """Settings of the site: launcher, and profiles of batch systems."""
 
     def __post_init__(self) -> None:
         if not self.auth and not loopback(self.host):
@@ -102,8 +104,8 @@ class Settings:
 
     @property
     def database_url(self) -> str | URL:
-        """Returns the database URL in use. The URL is built from parts, because ``%``, ``?`` or ``#`` in a file name
-        would be misread in a URL text.
+        """Returns the URL of the database. The URL is built from parts, because ``%``, ``?`` or ``#`` in a file name
+        have a special meaning in the text of a URL.
         """
         return self.database or URL.create("sqlite", database=str(self.database_file))
 
@@ -114,7 +116,7 @@ class Settings:
 
 
 def loopback(host: str) -> bool:
-    """True if ``host`` can be reached only from this machine."""
+    """Whether ``host`` can be reached only from this machine."""
     if host == "localhost":
         return True
     try:
@@ -130,8 +132,8 @@ def capped(site: Site) -> dict[str, float]:
 
 
 def site_of(path: Path | None) -> Site:
-    """Returns the site settings in a file; without a file, runs are started on this machine. Raises SettingsError if
-    the file is invalid.
+    """Returns the settings in the file of a site; without a file, the server starts the runs itself on this machine.
+    Raises SettingsError if the file is invalid.
     """
     try:
         return Site() if path is None else read_site(path)

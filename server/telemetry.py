@@ -1,9 +1,9 @@
-"""The Zenoh router inside the server: workers publish to the router, native clients subscribe to it.
+"""The Zenoh router inside the server: workers publish messages to it, and clients subscribe there.
 
-No other module of the server imports zenoh. Every token is a Zenoh user that may subscribe to the runs of its owner;
-every owner has one more Zenoh user with which the workers publish. Zenoh reads users and rules once; therefore the
-session is closed and opened again when the tokens change. Clients reconnect automatically and read missed messages from
-the journal.
+No other module of the server imports zenoh. Every token is a Zenoh user that may subscribe to the runs of its owner.
+Every owner has a further Zenoh user, with which its workers publish. Zenoh reads users and rules only when it starts.
+Therefore the router is closed and opened again when tokens change. Clients then reconnect automatically and read what
+they have missed from the journal.
 """
 
 import hashlib
@@ -50,7 +50,9 @@ class TelemetryError(StartError):
 
 @dataclass(frozen=True)
 class Reader:
-    """Access of a client to Zenoh. The user name ``user`` is empty for a router without access control."""
+    """Access data with which a client subscribes: endpoint, user name and password. ``user`` is empty for a router
+    without access control.
+    """
 
     port: int
     prefix: str
@@ -59,20 +61,21 @@ class Reader:
 
 
 class Telemetry:
-    """An open session of the Zenoh router. Methods of the router may be called from any thread."""
+    """The Zenoh router of a server. All methods of this class may be called from any thread."""
 
     def __init__(
         self, runs: Path, host: str, port: int, tokens: Iterable[Token] | None, nodes: Slurm | None = None
     ) -> None:
-        """Opens the Zenoh router. ``tokens`` is None for a router without access control; ``nodes``: network endpoints
-        for the nodes of a cluster. On a full disk the server has no router until ``follow`` can open the router. Raises
+        """Opens the Zenoh router. ``tokens``: None for a router without access control; ``nodes``: endpoints for the
+        nodes of a cluster. If the disk is full, the server works without a router until ``follow`` can open it. Raises
         TelemetryError; raises OSError if the secret cannot be made.
         """
         self._runs, self._host, self._nodes = runs, host, nodes
         self.port = port or _free_port(host)
         self._secret = _read_secret(runs)
         self._places = raise_limit()
-        """Largest number of simultaneous sessions, and largest number of connections that have not authenticated."""
+        """Largest number of sessions at the same time, and largest number of connections that have not
+        authenticated."""
         self._lock = threading.Lock()
         self._tokens = None if tokens is None else frozenset((token.id, token.owner) for token in tokens)
         self._session: zenoh.Session | None = None
@@ -83,7 +86,7 @@ class Telemetry:
 
     @property
     def local_endpoint(self) -> str:
-        """Network endpoint of the Zenoh router for the workers of this machine."""
+        """Endpoint of the router for the workers on this machine."""
         host = self._host if loopback(self._host) else _local(self._host)
         return f"tcp/{_bracketed(host)}:{self.port}"
 
@@ -96,8 +99,8 @@ class Telemetry:
         return Access(self.local_endpoint, prefix, user, self._password(user))
 
     def reader(self, owner: str, token: Token | None) -> Reader:
-        """Returns the credentials of a client, which are valid on return. Raises TelemetryError if the router cannot be
-        opened.
+        """Returns the access data with which a client subscribes; they are valid when the method returns. Raises
+        TelemetryError if the router cannot be opened.
         """
         prefix = keys.owner_prefix(owner)
         if self._tokens is None or token is None:
@@ -107,13 +110,13 @@ class Telemetry:
         return Reader(self.port, prefix, token.id, self._password(token.id))
 
     def follow(self, tokens: Iterable[Token]) -> None:
-        """Opens the Zenoh router again if the tokens have changed."""
+        """Opens the router again if the tokens have changed."""
         if self._tokens is not None:
             self.admit({(token.id, token.owner) for token in tokens})
 
     def admit(self, tokens: Iterable[tuple[str, str]]) -> None:
-        """Admits exactly the clients with the given tokens (token id, owner). Raises TelemetryError if the router
-        cannot be opened; the next call tries again.
+        """Admits exactly the clients with the given tokens, as pairs (token id, owner). Raises TelemetryError if the
+        router cannot be opened; the next call tries again.
         """
         with self._lock:
             wanted = frozenset(tokens)
@@ -127,8 +130,8 @@ class Telemetry:
                 raise TelemetryError(f"the Zenoh router cannot be opened: {error.filename}: {error.strerror}") from None
 
     def publish(self, owner: str, status: Status) -> None:
-        """Publishes a message on Zenoh. The journal already has the message, so that a lost Zenoh sample loses no
-        data.
+        """Publishes a message of the server about a run. The journal already has it, so that nothing is lost if a
+        client misses it.
         """
         key = keys.message_key(keys.run_prefix(owner, status.run), status.channel)
         with self._lock:
@@ -197,8 +200,8 @@ class Telemetry:
 
 
 def access_rules(tokens: Iterable[tuple[str, str]]) -> dict[str, Any]:
-    """Returns the access rules of Zenoh. The tokens of an owner may subscribe to the owner's keys, and the Zenoh user
-    of the owner's workers may publish under these keys. The rules forbid everything else.
+    """Returns the access rules of the router. The tokens of an owner may subscribe to the keys of the owner, and the
+    user of the owner's workers may publish under these keys. Everything else is forbidden.
     """
     readers: dict[str, list[str]] = {}
     for token, owner in tokens:
@@ -238,9 +241,8 @@ def _worker_user(owner: str) -> str:
 
 
 def _read_secret(runs: Path) -> bytes:
-    """Returns the secret from which all passwords are derived; the secret is made at the first start. Raises
-    TelemetryError if the file of the secret is too short or if other users can read it; raises OSError if the secret
-    cannot be made.
+    """Returns the secret from which all passwords are computed; it is made at the first start. Raises TelemetryError if
+    its file is too short or if other users can read it; raises OSError if it cannot be made.
     """
     path = runs / _SECRET
     remedy = "remove it, and the server makes a new one; clients that watch a run request a new password automatically"

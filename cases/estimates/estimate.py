@@ -81,7 +81,7 @@ class PartEstimate:
     elements: int | None
     nodes: int | None
     dt: float | None
-    """Stable time step of the smallest tet of the part at the start, s. It is infinite for a rigid part."""
+    """Stable time step of the smallest tet of the part at the start, s. For a rigid part the time step is infinite."""
     bulk: Bulk | None = None
 
 

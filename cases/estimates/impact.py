@@ -19,12 +19,13 @@ FEW, MANY, FULL, MOST = 5, 10, 40, 80
 number for driven rubble and with restitution; the largest number. The sections "Contact", "Driven rubble", "Sweeps by
 need" and "Restitution" of docs/theory/contact.md give the reasons."""
 FAST = 0.2
-"""Impact speed divided by the wave speed of the target, above which a step has at least MANY sweeps. The value is below
-half of the speed at which columns of metal became wrong with few sweeps (docs/theory/contact.md, "Plates under 100
-GPa")."""
+"""Impact speed divided by the wave speed of the target, above which a step has at least MANY sweeps. This limit of the
+impact speed is below half of the speed at which columns of metal became wrong with few sweeps (docs/theory/contact.md,
+"Plates under 100 GPa")."""
 PRESSING = 0.1
-"""Impact speed divided by the wave speed, above which flat contact surfaces buckle. The value is half of the speed at
-which the contact pressure between irregular copper plates was lost (docs/theory/contact.md, "Ridges under pressure").
+"""Impact speed divided by the wave speed, above which flat contact surfaces buckle. This limit of the impact speed is
+half of the speed at which the contact pressure between irregular copper plates was lost (docs/theory/contact.md,
+"Ridges under pressure").
 """
 
 
@@ -101,9 +102,9 @@ def _fast(case: Case, share: float) -> bool:
 def pressed(case: Case) -> list[bool]:
     """Returns, for each part, whether an impact presses it beyond its strength, so that flat contact surfaces buckle.
 
-    If two parts collide at more than PRESSING times the wave speed of one of them, the result is true for all parts.
-    Otherwise it is true for each part that yields, cannot fracture, and is hit so fast that the stress density c v / 2
-    of an impact on the same material exceeds its flow stress.
+    If two parts collide at more than PRESSING times the wave speed of one of them, all parts count as pressed beyond
+    their strength. Otherwise a part counts as pressed beyond its strength if it yields, cannot fracture, and is hit so
+    fast that the stress density c v / 2 of an impact on the same material exceeds its flow stress.
     """
     if _fast(case, PRESSING):
         return [True] * len(case.parts)

@@ -12,8 +12,8 @@ from .law import Law, Wrong
 
 class JohnsonHolmquist(Law):
     """Johnson-Holmquist 2 (JH-2), a law for ceramics and glass under high pressure. The strength depends on the
-    pressure. It decreases with the damage D from that of intact material, ``A (p* + T*)^N``, to that of fractured
-    material, ``B p*^M``; damaged material increases its pressure (bulking).
+    pressure. The strength decreases with the damage D from that of intact material, ``A (p* + T*)^N``, to that of
+    fractured material, ``B p*^M``; damaged material increases its pressure (bulking).
 
     ``p*`` is the pressure divided by ``pressure_hel``, and ``T*`` is ``tension`` divided by ``pressure_hel``. Both
     strengths are divided by the strength at the Hugoniot elastic limit, ``3/2 (hel - pressure_hel)``, and are

@@ -25,7 +25,7 @@ class Law(Model):
     model: str
     """Name of the law."""
     nanoseconds: ClassVar[float]
-    """CPU time of the law per tet and time step while the material flows, ns. The value was measured with 10,000 to
+    """CPU time of the law per tet and time step while the material flows, ns. The CPU time was measured with 10,000 to
     750,000 tets."""
     own_pressure: ClassVar[bool] = False
     """Whether the law has its own equation of state and its own largest tensile pressure."""

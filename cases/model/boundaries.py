@@ -29,9 +29,9 @@ class Symmetry(Model):
     """Names of the parts to which the plane of symmetry applies; all parts if empty."""
     on: SetName | None = None
     """Name of a node set or a surface in the mesh file of the parts ([howto/meshes.md](../howto/meshes.md)). Exactly
-    the nodes of the set are on the plane of symmetry; at the start they may be up to a hundredth of the shortest edge
-    away from it. All other nodes are beside the plane even if they touch it, as on the faces of a crack. Default: the
-    nodes that are on the plane within rounding errors."""
+    the nodes of the set are on the plane of symmetry; at the start a node of the set may be up to a hundredth of the
+    shortest edge away from the plane. All other nodes are beside the plane even if they touch it, as on the faces of a
+    crack. Default: the nodes that are on the plane within rounding errors."""
 
 
 class Wall(Model):
@@ -163,8 +163,8 @@ class Traction(Model):
     surface. A face is loaded until its tet is deleted. With ``follows`` the load also ends when the tet has separated
     from all other tets. Faces that become free during the run, and faces on a plane of symmetry, are not loaded. Nodes
     outside of the region count as inside if their distance is at most a hundredth of the shortest edge of their part.
-    ``conoid validate`` prints the approximate loaded area. The run gives a warning if the area in the mesh differs from
-    it.
+    ``conoid validate`` prints the approximate loaded area. The run gives a warning if the loaded area in the mesh
+    differs from the printed area.
     """
 
     kind: Literal["traction"]

@@ -62,8 +62,8 @@ class Contact(Model):
     fragments is wrong. The cost of contact is proportional to the number of sweeps."""
     skin: Annotated[Ratio, Positive] = 0.3
     """Skin of the broad phase divided by the harmonic mean of the sizes of the faces. The skin is twice the distance by
-    which a node may depart from its extrapolated motion before its candidate pairs are searched again. This key changes
+    which a node may depart from its extrapolated motion before its candidate pairs are searched again. The skin changes
     the cost, not the answer."""
     domain: Literal["arbitrary", "box"] = "arbitrary"
     """Method by which a rank selects the faces that other ranks receive as ghosts: by occupied cells (``arbitrary``),
-    or by bounding boxes (``box``). This key changes the cost, not the answer."""
+    or by bounding boxes (``box``). The method changes the cost, not the answer."""

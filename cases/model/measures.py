@@ -68,7 +68,7 @@ class Probe(Model):
     **Forces** on the whole part, N, as a mean since the previous line: ``contact_force_*``, normal forces and friction
     from all other bodies or from the part ``by``; ``wall_force_*``, the forces from walls. ``contact_impulse_*`` and
     ``wall_impulse_*``, N s, are the integrals of the forces since the start. The impulses include the whole last time
-    step; the velocities include only half of it.
+    step; the velocities include only half of this step.
 
     **Motion of a wall**, which the key ``wall`` names; without ``part``: ``wall_position_*``, m, of the ``point`` of
     the wall, and ``wall_velocity_*``, m/s. The force of the bodies on the wall is minus ``wall_force_*`` without
@@ -89,12 +89,12 @@ class Probe(Model):
     ``hole_diameter``: size of the free opening of the part in the plane ``axis = at`` around the line through
     ``centre``. The width is twice the smallest distance from the line to material. The diameter is that of a circle
     with the area that is visible from the line. The hole fields use 360 rays from the line, without the rays that met
-    no material at the start (behind planes of symmetry). Their error is about the size of a tet. They are 0 while
-    material is on the line, and not a number if the opening reaches the edge of the body. ``cone_angle``: full angle of
-    the cone broken out of a plate, 2 arctan((R - r) / thickness) in radians, for one cone per plate. R is the radius at
-    the high end of ``axis`` and r the radius at the low end: the radius of a circle with the area of the plate's face
-    that has more than half of the damage or is separated from the heaviest fragment. The angle is negative if the wide
-    end of the cone is at the low end.
+    no material at the start (behind planes of symmetry). The error of a hole field is about the size of a tet. A hole
+    field is 0 while material is on the line, and not a number if the opening reaches the edge of the body.
+    ``cone_angle``: full angle of the cone broken out of a plate, 2 arctan((R - r) / thickness) in radians, for one cone
+    per plate. R is the radius at the high end of ``axis`` and r the radius at the low end: the radius of a circle with
+    the area of the plate's face that has more than half of the damage or is separated from the heaviest fragment. The
+    angle is negative if the wide end of the cone is at the low end.
     """
 
     name: Name

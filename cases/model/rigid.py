@@ -30,8 +30,8 @@ class Rigid(Model):
     """Moments of inertia about the centre of mass, along the axes of the case, at the start: xx, yy, zz, yz, zx, xy,
     the integrals of density times y^2 + z^2, z^2 + x^2, x^2 + y^2, -yz, -zx, -xy. The inertia tensor must be positive
     definite, with no principal moment above the sum of the other two moments. Default: the sum over the nodes of the
-    mesh, where each tet gives a quarter of its mass to each node. This sum exceeds the inertia of the smooth body by a
-    fraction of about (tet size / body size)^2."""
+    mesh, where each tet gives a quarter of its mass to each node. The inertia of the mesh exceeds the inertia of the
+    smooth body by a fraction of about (tet size / body size)^2."""
 
 
 class Flag:

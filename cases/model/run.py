@@ -34,7 +34,7 @@ class Run(Model):
     cut_scale: tuple[Scale, Scale, Scale] = (1.0, 1.0, 1.0)
     """Factors by which the coordinates are multiplied for the domain decomposition. A small factor along a direction
     avoids cuts across this direction. With a small factor along the direction of impact, every rank has a part of the
-    impact zone. This key changes the cost of a run, not its answer."""
+    impact zone. The key ``cut_scale`` changes the cost of a run, not its answer."""
     frames: Annotated[Count, Field(ge=0, le=100_000)] = 20
     """Number of frames (complete fields, VTKHDF), evenly spaced up to the end; frame 0 is the initial state. 0: no
     frames. A time step ends at the time of each frame; therefore another number of frames changes the time steps. The
@@ -45,9 +45,9 @@ class Run(Model):
     e'. If the principal axes do not rotate, it equals the integral of the strain rate, which other explicit codes
     store. ``strain_rate``: sqrt(2/3 d' : d') of the deviator of the rate of deformation d. ``contact_pressure``:
     impulse of contact and walls on a node since the previous frame, divided by the time since then and by the node's
-    share of the loaded surface; only the component normal to this share counts. It is 0 in the first frame. The share
-    of a node is a third of each of its faces whose normal deviates by less than 60 degrees from the impulse. Forces of
-    walls on rigid parts are not included in ``contact_pressure``: use a probe of ``wall_force``."""
+    share of the loaded surface; only the component normal to this share counts. The contact pressure is 0 in the first
+    frame. The share of a node is a third of each of its faces whose normal deviates by less than 60 degrees from the
+    impulse. Forces of walls on rigid parts are not included in ``contact_pressure``: use a probe of ``wall_force``."""
     sets: tuple[SetName, ...] = ()
     """Names of node sets and surfaces of mesh files. Frames contain these sets, and the sets that boundaries and probes
     select with ``on``: a point array ``set_NAME`` for each set, 1 on the nodes of the set. The command ``conoid view

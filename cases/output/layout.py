@@ -1,4 +1,4 @@
-"""The files in the folder of a run. They are plain files that can be read without the server.
+"""The files in the folder of a run. All of these files can be read without the server.
 
 ::
 
@@ -55,8 +55,8 @@ continue."""
 INTERRUPTED = "interrupted.json"
 """Name of the preliminary outcome of a run that was interrupted and will continue."""
 ARRAYS = ".arrays"
-"""Name of a folder beside the folders of the runs. It has one folder per job array, with the script and the list of
-runs of the array."""
+"""Name of a folder beside the folders of the runs. The folder ``.arrays`` has one folder per job array, with the script
+and the list of runs of the array."""
 ARRAY = "folders.json"
 """Name of the file that lists the run folders of the tasks of a job array, in the order of the tasks."""
 LOCK = ".lock"

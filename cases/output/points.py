@@ -1,5 +1,5 @@
-"""The table of a sweep (several runs of a case with changed keys). It has one line per run, and columns for the changed
-keys, for properties of the run, and for results.
+"""The table of a sweep (several runs of a case with changed keys). The table has one line per run, and columns for the
+changed keys, for properties of the run, and for results.
 
 The values are numbers; the header of each column gives its name and its unit. Server, client and page use this table.
 """

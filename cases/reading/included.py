@@ -83,7 +83,7 @@ class Included:
 
 
 class Line(int):
-    """Number of a line in its file. Its text is ``7``, or ``7 of mesh.inc`` for an included file."""
+    """Number of a line in its file. The text of the line number is ``7``, or ``7 of mesh.inc`` for an included file."""
 
     file: str
 

@@ -34,8 +34,8 @@ class InpError(ConoidError, ValueError):
 
 @dataclass(frozen=True)
 class Block:
-    """A keyword line. It has the keyword in upper case without blanks or hyphens, the parameters as pairs (word, value
-    or None), and the line number.
+    """A keyword line: its keyword, its parameters and its line number. The keyword is in upper case without blanks or
+    hyphens; the parameters are pairs (word, value or None).
     """
 
     word: str

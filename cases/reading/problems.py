@@ -44,7 +44,9 @@ class ConoidError(Exception):
 
 
 class CaseError(ConoidError, ValueError):
-    """Error: a case is not valid. Its attribute ``problems`` lists every error; its text has one line per error."""
+    """Error: a case is not valid. The attribute ``problems`` lists every error of the case; the text of the exception
+    has one line per error.
+    """
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         """Creates the exception with the first hundred of ``problems``."""

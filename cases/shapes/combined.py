@@ -68,8 +68,8 @@ def box_of(form: CombinedForm | Operand) -> Bounds | None:
 
 
 def _unturned(form: Operand) -> bool:
-    """Whether the bounding box of an operand contains the operand at its position. This is so if no operand in it is
-    turned.
+    """Whether the bounding box of an operand contains the operand at its position. The box contains the operand if no
+    operand inside of the operand is turned.
     """
     return not isinstance(form, CombinedForm) or form.turn is None
 

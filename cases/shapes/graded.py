@@ -31,8 +31,8 @@ def size_at(size: float, grading: Grading) -> Callable[[Vector], float]:
 def sizes_by_depth(size: float, grading: Grading, volume: float, surface: float) -> list[float]:
     """Returns the element sizes, m, at equal fractions of the volume of a body, from the surface inwards.
 
-    The fraction of the volume that is deeper than d is (1 - d / r)^3 with r = 3 volume / surface. This is exact for a
-    sphere and for a cube.
+    The fraction of the volume that is deeper than d is (1 - d / r)^3 with r = 3 volume / surface. The formula is exact
+    for a sphere and for a cube.
     """
     r = 3.0 * volume / surface
     shares = [(k + 0.5) / _DEPTHS for k in range(_DEPTHS)]

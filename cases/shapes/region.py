@@ -15,9 +15,9 @@ from ..model.tables import Point
 
 NEAR, MOST = 0.01, 0.1
 """Tolerances at a border, divided by the shortest edge of a part (chosen values). A point counts as inside if its
-distance from the border is at most the first value; the tolerance for rounding is at most the second value. The values
-are far above rounding errors: those of rotations, sums and units, and those of files with six digits up to 2,000 edges
-from the origin. They are far below the distance between two layers of nodes."""
+distance from the border is at most the first value; the tolerance for rounding is at most the second value. The
+tolerances are far above rounding errors: those of rotations, sums and units, and those of files with six digits up to
+2,000 edges from the origin. The tolerances are far below the distance between two layers of nodes."""
 GENERATED, FILE = 1e-9, 5e-6
 """Rounding error of a coordinate, divided by the largest coordinate of the part: in generated meshes, and in mesh
 files. The first value is far above the errors of rotations and sums (1e-15). The second value is that of six

@@ -80,8 +80,8 @@ class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     poll: float = 2.0
     """Time between two calls of squeue, which ask for the jobs of all runs, s (chosen value)."""
     slots: int = 100_000
-    """Largest number of cores of all submitted jobs together, including pending jobs (chosen value). It is large
-    because Slurm has its own limits."""
+    """Largest number of cores of all submitted jobs together, including pending jobs (chosen value). The number is
+    large because Slurm has its own limits."""
 
 
 class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):

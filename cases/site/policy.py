@@ -54,8 +54,8 @@ class Queue(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     half_life: str = "168 h"
     """Time after which the past usage of a user counts half: a week (chosen value)."""
     memory: int | None = None
-    """Memory for all concurrent runs, bytes. The estimates of the runs are compared with it. Absent: the memory of the
-    machine."""
+    """Memory for all concurrent runs, bytes. The server compares the estimated memory of the runs with this limit.
+    Absent: the memory of the machine."""
     threads: int | None = None
     """Threads of each rank of a run whose case does not give ``run.threads``. Absent: the cores of the server divided
     by the number of ranks, at most one thread for each 3,000 tets; in a batch system one thread."""
@@ -129,10 +129,10 @@ class Files(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     status 413."""
     bytes: int = 16 << 30
     """Largest size of all files of a user together, bytes, including uploads in progress (chosen value). Files beyond
-    it are refused with the HTTP status 429."""
+    this limit are refused with the HTTP status 429."""
     number: int = 1000
     """Largest number of files of a user. Listing so many files takes some 10 ms (reason of the chosen value). Files
-    beyond it are refused with the HTTP status 429."""
+    beyond this limit are refused with the HTTP status 429."""
     age: str = "24 h"
     """Time after which a file that no run uses and no request has read is removed (chosen value). A case is normally
     submitted seconds after its files, and an interrupted upload can continue the next morning."""
@@ -147,14 +147,14 @@ class Http(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
     """Limits of the concurrent requests of one user, and of one network address whose requests have no valid token."""
 
     requests: int = 16
-    """Largest number of requests that are processed at once (chosen value). Their bodies (at most 1 MiB each) and their
-    answers are in memory."""
+    """Largest number of requests that are processed at once (chosen value). The bodies of these requests (at most 1 MiB
+    each) and the answers are in memory."""
     waiting: int = 200
-    """Largest number of further requests that wait (chosen value). Requests beyond it are refused with the HTTP status
+    """Largest number of further requests that wait (chosen value). Further requests are refused with the HTTP status
     429."""
     streams: int = 100
     """Largest number of long responses at once: event streams, logs that are followed, waits for a change, and
-    downloads (chosen value). Further ones are refused with the HTTP status 429."""
+    downloads (chosen value). Further long responses are refused with the HTTP status 429."""
     threads: int = 2
     """Largest number of responses that are computed or wait for the disk at once (chosen value). The server is one
     Python process with 64 threads for all users."""

@@ -46,9 +46,9 @@ def griffith(made: Material) -> float:
 
 
 def impact_stresses(case: Case) -> list[float]:
-    """Returns, for each part, the largest stress of the plane wave of an impact, Pa. It is the impact speed
+    """Returns, for each part, the largest stress of the plane wave of an impact, Pa. The stress is the impact speed
     (impact.impact_speeds) times Z1 Z2 / (Z1 + Z2), where Z1 and Z2 are the impedances of the part and of the part that
-    it hits; for a wall it is the impact speed times Z1.
+    it hits; for an impact on a wall, the stress is the impact speed times Z1.
     """
     bounds = [velocities(case, part) for part in case.parts]
     weights = [_impedance(material(case, part.material)) for part in case.parts]

@@ -1,7 +1,8 @@
-"""The card of a run in the table of runs: the values of its case and, after its end, its results.
+"""The card of a run: the row of data that the table of runs shows, with the values of its case and, after its end, its
+results.
 
-A case never changes, and results do not change after the end of the run, so a card is made once from the files in
-the run's folder.
+A case never changes, and results do not change after the end of the run. Therefore a card is made only once, from the
+files in the run's folder.
 """
 
 import zlib
@@ -29,20 +30,20 @@ _RESULTS = 200
 _MOST_BYTES = 8 << 20
 """Largest size in bytes of a case file that is read (chosen value)."""
 _LEFT_OUT = ("digest", ".passed")
-"""Last words of the names of results that are texts, not numbers."""
+"""Endings of the names of results that are texts and not numbers; such results are not part of a card."""
 
 
 class Card(msgspec.Struct, kw_only=True, frozen=True):
-    """Values and results of one run; ``results`` is None before the end of the run."""
+    """The card of one run; ``results`` is None before the end of the run."""
 
     title: str = ""
     values: dict[str, Scalar] = {}
     """Values of the case by key, in SI units."""
     results: dict[str, float | None] | None = None
     units: dict[str, str] = {}
-    """Units of the results by name; results without a unit are missing."""
+    """Units of the results, by the name of the result; results without a unit are not listed."""
     references: int = 0
-    """Number of reference values with which the run was compared."""
+    """Number of reference values with which the results of the run were compared."""
     missed: list[str] = []
     """Names of the reference values from which the results of the run differ by more than the tolerance."""
 
@@ -63,8 +64,8 @@ def unpacked(data: bytes) -> Card:
 
 
 def of(path: Path, final: bool) -> Card:
-    """Makes the card of the run in the folder ``path``. Missing and damaged files of the run are left out of the
-    card.
+    """Makes the card of the run in the folder ``path``. If files of the run are missing or damaged, the card lacks
+    their data.
     """
     ended = _ended(path) if final else None
     found = {

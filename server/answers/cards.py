@@ -1,6 +1,4 @@
-"""Cards of runs in the database. The table of cards is an index over the folders of runs, and can be made again from
-the folders.
-"""
+"""The cards of runs (module ``card``) in the database. Cards can be made again from the folders of the runs."""
 
 import time
 import zlib
@@ -16,7 +14,7 @@ from . import card
 from .card import Card
 
 _PATIENCE = 0.5
-"""Time in s in which one request makes missing cards: some hundred cards (chosen value)."""
+"""Time in s for which one request makes missing cards (chosen value); it is enough for some hundred cards."""
 
 
 class Cards:
@@ -51,7 +49,7 @@ class Cards:
 
 
 def _read(kept: KeptCard | None, run: Run) -> Card | None:
-    """Returns the stored card of a run; None if the card was made before the run reached its present state."""
+    """Returns the stored card of a run; None if it was made before the run reached its present state."""
     if kept is None or kept.form != card.FORM or kept.final != run.state.final:
         return None
     try:

@@ -21,11 +21,11 @@ from ..runs.journal import Tail
 _GROUPS = 4096
 """Largest number of groups of lines: more than the number of pixels across a screen (chosen value)."""
 _NUMBERS = 400_000
-"""Largest product of the number of groups and the number of columns: 6 MB of numbers (chosen value)."""
+"""Largest product of the number of groups and the number of columns: 6 MB of memory (chosen value)."""
 _SENT = 200_000
 """Largest number of values in an answer: 4 MB of JSON (chosen value)."""
 _BLOCK = 1 << 20
-"""Number of bytes of one read of history.csv (chosen value)."""
+"""Number of bytes that are read from history.csv at once (chosen value)."""
 _AT_ONCE = 32
 """Largest number of blocks of history.csv that are read for one answer: some 100,000 lines, half a second (chosen
 value)."""
@@ -35,12 +35,15 @@ than a thousand columns (reason of the chosen limit)."""
 _TEXT = frozenset({"limiter"})
 """Names of the columns of history.csv whose values are texts."""
 csv.field_size_limit(1 << 30)
-"""Largest length in characters of a field of history.csv. The csv module of Python refuses longer fields. A field of
-history.csv that is not a number becomes NaN."""
+"""Largest number of characters of a field of history.csv that the csv module accepts. A field that is not a number
+becomes NaN.
+"""
 
 
 class Columns:
-    """Content of a history.csv file as far as the file has been read. The caller must hold the lock of this object."""
+    """The columns of a history.csv file, up to the line that was read last. The caller must hold the lock of this
+    object.
+    """
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -50,17 +53,17 @@ class Columns:
         self._tail = Tail(self._path)
         self._file = self._size = 0
         self.units: dict[str, str] = {}
-        """Units of the numeric columns, by name."""
+        """Unit of each numeric column, by the name of the column."""
         self.lines = 0
         self.behind = False
         """True while history.csv has lines that have not been read."""
         self._width, self._every = 0, 1
         self._places: list[int] = []
-        """Positions of the numeric columns in a line."""
+        """Position of each numeric column in a line."""
         self._kept: list[array[float]] = []
-        """Minimum and maximum of each group of ``_every`` lines, by name of the column."""
+        """Minimum and maximum of each group of ``_every`` lines, for each numeric column."""
         self._open: list[list[float]] = []
-        """Values of the lines of the last group, which is incomplete, by name of the column."""
+        """Values of the last group of lines, which is not complete yet, for each numeric column."""
         self._extremes: list[tuple[float, float]] = []
         self._last: list[float] = []
 
@@ -80,7 +83,7 @@ class Columns:
         self.behind = True
 
     def _is_another(self) -> bool:
-        """Whether the file was replaced since the last call: a run that continues from a checkpoint writes a new
+        """Whether history.csv was replaced since the last call: a run that continues from a checkpoint writes a new
         file.
         """
         try:
@@ -109,7 +112,7 @@ class Columns:
         pairs = [history.split(name) for name in names]
         self._width = len(names)
         places = {name: k for k, (name, _) in reversed([*enumerate(pairs)]) if name not in _TEXT}
-        self._places = sorted(places.values())[:_MOST_COLUMNS]  # a repeated name is its first column
+        self._places = sorted(places.values())[:_MOST_COLUMNS]  # a repeated column name means its first column
         self.units = dict(pairs[k] for k in self._places)
         number = len(self._places)
         self._kept = [array("d") for _ in range(number)]
@@ -144,9 +147,9 @@ class Columns:
         }
 
     def values(self, names: Sequence[str], points: int) -> dict[str, list[float]]:
-        """Returns the columns, by name, with about ``points`` values each at most. A file with fewer lines than
-        ``points`` gives all values. A longer file gives the minimum and the maximum of each group of lines in the order
-        of occurrence, and the last value.
+        """Returns the named columns with at most about ``points`` values each. A file with fewer lines than ``points``
+        gives all values. A longer file gives the minimum and the maximum of each group of lines in the order of
+        occurrence, and the last value.
         """
         chosen = frozenset(names)
         places = {name: at for at, name in enumerate(self.units) if name in chosen}

@@ -10,12 +10,13 @@ from weakref import WeakValueDictionary
 from ..requests.thread_pool import ThreadPool
 
 State = tuple[int, int, int, int, int]
-"""State of a file: device, inode, times of the last change of content and of the inode in ns, size in bytes."""
+"""State of a file: device, inode, time of the last change of its content in ns, time of the last change of its inode in
+ns, size in bytes."""
 _KEPT = 10_000
 """Largest number of stored digests, 32 bytes each (chosen value)."""
 _SLICE, _CHUNK = 1 << 25, 1 << 18
-"""Number of bytes that one task hashes, and number of bytes of one read. The chosen number takes 0.1 s, so that the
-server handles other requests of the user between two tasks."""
+"""Number of bytes that one task hashes, and number of bytes that are read at once. A task takes 0.1 s; the server
+handles other requests of the user between two tasks (chosen values)."""
 
 
 def state_of(file: BinaryIO) -> State:
@@ -25,12 +26,12 @@ def state_of(file: BinaryIO) -> State:
 
 
 class Digests:
-    """Cache of SHA-256 digests; the key of a digest is the state of its file. The class is used only in the thread of
-    the event loop.
+    """Cache of SHA-256 hashes of files; the key is the state of the file. The class is used only in the thread of the
+    event loop.
     """
 
     def __init__(self, pool: ThreadPool) -> None:
-        """Creates an empty cache of digests."""
+        """Creates an empty cache. ``pool``: pool of threads that compute hashes."""
         self._pool = pool
         self._known: OrderedDict[State, bytes] = OrderedDict()
         self._locks: WeakValueDictionary[State, asyncio.Lock] = WeakValueDictionary()

@@ -23,9 +23,10 @@ from ..requests.user_limits import place_of
 from .digests import Digests, State, state_of
 
 _CHUNK = 1 << 18
-"""Number of bytes of one read and of one send; larger blocks were not faster (measured)."""
+"""Number of bytes that are read and sent at once; larger numbers were not faster (measured)."""
 _SMALL = 1 << 20
-"""Largest size in bytes of a file that is sent and hashed in one step: 1 ms of CPU time (chosen value)."""
+"""Largest size in bytes of a file that is hashed before it is sent, without a task of its own: 1 ms of CPU time (chosen
+value)."""
 _RANGE = re.compile(r"bytes=(\d{0,18})-(\d{0,18})")
 _TYPES = {
     ".json": "application/json", ".jsonl": "application/x-ndjson", ".toml": "application/toml",
@@ -36,8 +37,8 @@ _TYPES = {
 
 @dataclass(frozen=True)
 class Entry:
-    """A file of a run. The field ``path`` is relative to the run's folder; ``modified`` is the Unix time of the last
-    change of the file, s.
+    """A file of a run. ``path``: path relative to the run's folder; ``modified``: Unix time of the last change of the
+    file, s.
     """
 
     path: str
@@ -94,7 +95,7 @@ class Downloads:
     """Sends files of runs as HTTP answers. The class is used only in the thread of the event loop."""
 
     def __init__(self, pool: ThreadPool) -> None:
-        """``pool``: pool of threads that read files; the pool limits the threads of each user."""
+        """Creates the object. ``pool``: pool of threads that read files; it limits the threads of each user."""
         self._pool, self._digests = pool, Digests(pool)
 
     async def respond(self, request: Request, folder: Path, relative: str, ended: bool) -> Response:
@@ -134,8 +135,8 @@ class Downloads:
     async def whole(
         self, request: Request, folder: Path, relative: str, size: int, headers: Mapping[str, str], media_type: str
     ) -> Response:
-        """Sends a file of ``size`` bytes that never changes, with the ``headers`` of the caller. Raises ServiceError
-        with status 404 if the file is missing or has another size, because a browser would cache a damaged file; raises
+        """Sends a file of ``size`` bytes that never changes, with the additional ``headers``. Raises ServiceError with
+        status 404 if the file is missing or has another size, because a browser would cache a damaged file; raises
         ServiceError with status 429 or 503 if the server is busy.
         """
         file, state = await self._pool.run(_opened, folder, relative)
@@ -156,8 +157,8 @@ def _opened(folder: Path, relative: str) -> tuple[BinaryIO, State]:
 
 
 def is_known(etag: str, text: str) -> bool:
-    """Whether the header If-None-Match contains this ETag or ``*``. A weak ETag, which proxies make from a strong ETag,
-    is treated as equal to the strong ETag.
+    """Whether the header If-None-Match contains this ETag or ``*``. A proxy may have changed a strong ETag to a weak
+    one; a weak ETag therefore counts as equal to the strong one.
     """
     known = {tag.strip().removeprefix("W/") for tag in text.split(",")}
     return etag in known or known == {"*"}
@@ -173,8 +174,8 @@ def tagged(body: bytes, known: str) -> Response:
 
 
 def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:
-    """Returns the first byte, the end, and the HTTP status of the answer. The answer to a request for several ranges is
-    the whole file.
+    """Returns the first byte of the requested part, the byte after its end, and the HTTP status of the answer. If
+    several parts are requested, the whole file is sent.
     """
     match = _RANGE.fullmatch(request.headers.get("range", "").replace(" ", ""))
     if match is None or match[0] == "bytes=-" or request.headers.get("if-range", etag) != etag:
@@ -190,7 +191,7 @@ def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:
 
 
 class _FileResponse(StreamingResponse):
-    """Yields a part of an open file. The file is closed at the end, even if the client disconnects."""
+    """HTTP answer with a part of an open file. The file is closed at the end, even if the client disconnects."""
 
     def __init__(
         self, pool: ThreadPool, file: BinaryIO, begin: int, end: int, status: int, headers: Mapping[str, str]

@@ -19,27 +19,27 @@ _Column = sa.ColumnElement[str]
 
 @dataclass(frozen=True)
 class Chosen:
-    """Filters of a list of runs. A filter without a value excludes no run. All times are Unix times in s."""
+    """Filters of a list of runs. A filter that is not set excludes no run. All times are Unix times in s."""
 
     states: Sequence[State] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
     case: str = ""
-    """Name of the case; ``*`` stands for any characters."""
+    """Name of the case; ``*`` matches any characters."""
     words: Sequence[str] = ()
     """Words of a search. Each word must occur in the case's name or title, in a label, state, cause or message, or at
     the start of the id."""
     since: float | None = None
-    """Earliest time of submission (inclusive), Unix time in s."""
+    """Earliest time of submission, inclusive."""
     until: float | None = None
-    """Latest time of submission (exclusive), Unix time in s."""
+    """Latest time of submission, exclusive."""
     runs: Sequence[str] | None = None
-    """Ids of the wanted runs; None: no filter by id."""
+    """Ids of the runs that may be in the list; None: all runs."""
     changed: float | None = None
-    """Unix time, s: the list contains all open runs, and the runs that were submitted or ended at this time or
+    """With this time, the list contains all open runs and the runs that were submitted or ended at this time or
     later."""
 
     def where(self, owner: str) -> Iterator[sa.ColumnElement[bool]]:
-        """Yields the SQL conditions; a run is in the list if it fulfils all conditions."""
+        """Yields the SQL conditions that a run in the list fulfils."""
         runs = RUNS.c
         yield runs.owner == owner
         if self.states:
@@ -65,7 +65,9 @@ def _literal(text: str) -> str:
 
 
 def _like(column: _Column, pattern: str) -> sa.ColumnElement[bool]:
-    """Compares texts without case in every database; databases differ in their default."""
+    """Returns the condition that a column matches a pattern. Capital and small letters count as equal in every
+    database.
+    """
     return sa.func.lower(column).like(pattern.lower(), escape=_ESCAPE)
 
 

@@ -13,23 +13,23 @@ from . import download
 from .schemas.history import FragmentCourse
 
 MOST = 200
-"""Largest number of snapshots that are read for the history of a fragment; the snapshots are evenly spaced. The chosen
-number of snapshots takes 0.2 s without cached tables."""
+"""Largest number of snapshots that are read for the history of a fragment; the snapshots are evenly spaced. Reading
+them takes 0.2 s if no table is cached (reason of the chosen value)."""
 _KNOWN = 512
 """Largest number of cached tables of fragments of all runs: at most 50 MB of memory."""
 _HEADER = 16
-"""Number of bytes at the start of a snapshot that contain the length of the header."""
+"""Number of bytes at the start of a snapshot file; they contain the length of its header."""
 _LONGEST = 1 << 24
 """Largest size in bytes of the header of a snapshot: a hundred times the longest header of a shipped case (chosen
 value)."""
 _DAMAGE = ValueError, IndexError, TypeError, OverflowError, RecursionError
-"""Errors that are raised if a header has wrong numbers or a file is truncated."""
+"""Errors that reading a damaged snapshot can raise: wrong numbers in the header, or a truncated file."""
 _COLUMNS = "fragment_id", "fragment_mass", "fragment_velocity", "fragment_size", "fragment_tets"
 
 
 def course(folder: Path, snapshots: Sequence[Snapshot], label: int) -> FragmentCourse:
-    """Returns the history of the fragment ``label`` of the run in ``folder``. A snapshot that is damaged, or does not
-    contain the fragment, adds no row to the history.
+    """Returns the history of the fragment ``label`` of the run in ``folder``. A snapshot that is damaged, or that does
+    not contain the fragment, is left out.
     """
     most = min(MOST, len(snapshots))
     chosen = sorted({round(k * (len(snapshots) - 1) / max(most - 1, 1)) for k in range(most)})
@@ -50,7 +50,7 @@ def _found(folder: Path, message: Snapshot, label: int) -> Iterator[tuple[float,
 
 @lru_cache(maxsize=_KNOWN)
 def _table(folder: Path, path: str, _sha256: str) -> tuple[memoryview, ...]:
-    """Returns the requested columns of the table of fragments; no other column is read from the file. Raises
+    """Returns the needed columns of the table of fragments of a snapshot; the other columns are not read. Raises
     ServiceError, OSError or ValueError.
     """
     with download.open_inside(folder, path) as file:

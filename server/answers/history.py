@@ -1,9 +1,9 @@
-"""History of a run from its journal, with a limited number of reports, so that the history of a run with a million
-events is shown at once.
+"""History of a run from its journal: a limited number of samples, so that a chart of a run with a million messages is
+shown at once.
 
-The journal is read once; later calls read only the new lines of the journal. For most lines of the journal only the
-message type is decoded. Every n-th report is kept unchanged, and n doubles when the number of reports reaches the
-limit. All rare events are kept: balance events, snapshots and states.
+The journal is read once; later calls read only the new lines of the journal. For most lines only the message type is
+decoded. If the number of samples reaches the limit, only every second sample is kept, and from then on only every n-th
+new sample, where n doubles each time. Messages about load balance, snapshots and states are rare; all of them are kept.
 """
 
 import re
@@ -23,18 +23,17 @@ from .columns import Columns
 from .log_messages import KINDS, Notes
 
 _SAMPLES = 4096
-"""Largest number of reports that are kept of a run: a few times the number of pixels of a chart (chosen value)."""
+"""Largest number of samples that are kept of a run: a few times the number of pixels across a chart (chosen value)."""
 _BYTES = 16 << 20
-"""Largest size of the kept reports of a run, bytes: enough for all reports of a run of some hundred ranks (chosen
-value)."""
+"""Largest size of the samples of a run, bytes (chosen value); a run of some hundred ranks stays below it."""
 _CUTS = 10_000
-"""Number of newest balance events that are kept (chosen value)."""
+"""Number of messages about load balance that are kept, the newest ones (chosen value)."""
 _RUNS = 16
-"""Number of most recently requested runs whose history is cached (chosen value)."""
+"""Number of runs whose history is cached: those that were requested last (chosen value)."""
 _BLOCK = 4 << 20
-"""Number of bytes of one read of the journal (chosen value)."""
+"""Number of bytes that are read from the journal at once (chosen value)."""
 _TYPE = slice(9, 13)
-"""Bytes of a journal line before the type of its message."""
+"""Position in a journal line of four characters that identify the type of its message."""
 
 _SHA256 = re.compile("[0-9a-f]{64}")
 _snapshot = msgspec.json.Decoder(Snapshot)
@@ -43,7 +42,7 @@ _status = msgspec.json.Decoder(Status)
 
 @dataclass(frozen=True)
 class Sample:
-    """A report: at one simulated time, the newest journal line of each message type; b"" for a type without a line
+    """A sample: for one simulated time, the newest journal line of each message type; b"" if there is no such line
     yet.
     """
 
@@ -54,7 +53,7 @@ class Sample:
 
     @property
     def size(self) -> int:
-        """Size of the report in bytes, without journal lines that several reports have in common."""
+        """Size of the sample in bytes, without journal lines that it shares with other samples."""
         return len(self.progress) + len(self.load)
 
 
@@ -74,16 +73,16 @@ class History:
     newest: Sample | None = None
     cuts: list[bytes] = field(default_factory=list)
     snapshots: dict[int, bytes] = field(default_factory=dict)
-    """Lines of the journal about snapshots, by the number of the snapshot."""
+    """Lines of the journal about snapshots, by snapshot number."""
     notes: Notes = field(default_factory=Notes)
     answers: dict[int, tuple[int, bytes]] = field(default_factory=dict)
-    """Cached answers for a run that has ended, by number of points: ``seq`` of the last event, and the HTTP body."""
+    """Cached HTTP bodies of a run that has ended, by the requested number of points: ``seq`` of the last message, and
+    the body."""
 
     def __post_init__(self) -> None:
         self.lock = threading.Lock()
         self.columns = Columns(self.path.with_name(layout.HISTORY))
-        """Columns of history.csv. The file history.csv is read separately from the journal, under the lock of the
-        history."""
+        """Reader of the columns of history.csv. The reader of the columns is used under the lock of the history."""
         self._tail = Tail(self.path)
         self._progress = self._counts = self._snapshot = b""
         self._every, self._reports, self._size = 1, 0, 0
@@ -150,8 +149,8 @@ class Histories:
         self._known: OrderedDict[Path, History] = OrderedDict()
 
     def of(self, path: Path) -> History:
-        """Returns the history of the journal at ``path``. The caller must take the lock of the history and call
-        ``catch_up``.
+        """Returns the history of the journal at ``path``. The caller must hold the lock of the history while it calls
+        ``catch_up`` and reads the history.
         """
         with self._lock:
             found = self._known.setdefault(path, History(path))

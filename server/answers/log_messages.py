@@ -1,4 +1,4 @@
-"""Messages of a run for people: log, states and checkpoints, as lines of the journal."""
+"""The messages of a run that the page shows as text: log lines, states and checkpoints, taken from the journal."""
 
 from collections import deque
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ limit)."""
 _WARNINGS = 200
 """Largest number of warnings (chosen value); later warnings are dropped."""
 KINDS = frozenset({b'log"', b"stat", b"chec"})
-"""First letters of the message types that the log shows."""
+"""Beginnings of the message types that the log contains."""
 
 _decode = msgspec.json.Decoder(Log | Status | Checkpoint).decode
 
@@ -29,7 +29,7 @@ class Notes:
     first: list[bytes] = field(default_factory=list)
     newest: deque[bytes] = field(default_factory=lambda: deque(maxlen=_NEWEST))
     warnings: dict[str, bytes] = field(default_factory=dict)
-    """Journal lines of warnings and errors, by text; a repeated text is stored once."""
+    """Journal lines with warnings and errors, by their text; a text that occurs again is stored once."""
     left_out: int = 0
 
     def take(self, line: bytes) -> None:

@@ -1,4 +1,4 @@
-"""Metrics for Prometheus: runs, slots, streams, and the duration of answers."""
+"""Metrics for Prometheus: runs, cores in use, streams, and the duration of requests."""
 
 import time
 from collections import Counter as Counts
@@ -14,20 +14,20 @@ from conoid.cases.run import State
 from ..service import Service
 
 _BUCKETS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.2, 0.5, 1.0, 5.0, 30.0)
-"""Upper bounds of the bins of the histogram of durations, s. The chosen bounds are close to 50 and 200 ms, which are
-the required limits for the duration of an answer."""
+"""Upper bounds of the bins of the histogram of durations, s. Bounds near 50 and 200 ms are needed, because they are the
+required limits for an answer (chosen values)."""
 
 
 _METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
-"""HTTP methods that are counted separately. All other HTTP methods are counted together, because a client may send any
-word as a method and each counter stays for ever."""
+"""HTTP methods that have a counter of their own. All other methods share one counter: a client may send any word as a
+method, and counters are never removed."""
 
 
 class Metrics:
     """Metrics of one server."""
 
     def __init__(self, service: Service) -> None:
-        """Creates all counters of the metrics with the value 0."""
+        """Creates all counters with the value 0."""
         self.registry = CollectorRegistry()
         ProcessCollector(registry=self.registry)
         self.registry.register(_Runs(service))
@@ -43,7 +43,7 @@ class Metrics:
         return generate_latest(self.registry)
 
     def answered(self, scope: Scope, status: int, seconds: float) -> None:
-        """Counts an answer under the pattern of its route, so that the number of time series is the number of
+        """Counts an answer under the pattern of its route; the number of time series then does not exceed the number of
         routes.
         """
         route = getattr(scope.get("route"), "path", "none")
@@ -53,13 +53,15 @@ class Metrics:
 
 
 class _Runs(Collector):
-    """Gauges, whose values are read from the parts of the server at each request of /metrics."""
+    """Metrics whose values are read from the parts of the server at each request of /metrics."""
 
     def __init__(self, service: Service) -> None:
         self._service = service
 
     def _counts(self) -> Counts[State]:
-        """Counts the runs whose folder exists. Raises SQLAlchemyError, OSError."""
+        """Returns the number of runs in each state, without runs whose folder is missing. Raises SQLAlchemyError,
+        OSError.
+        """
         ended = self._service.store.ended()
         gone = Counts(ended[run_id] for run_id in self._service.existing.gone(ended.keys()))
         return Counts(self._service.store.count_by_state()) - gone
@@ -93,8 +95,8 @@ class Timed:
         self._app, self._metrics = app, metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Measures the time until the answer begins. An exception is raised again, so that an outer middleware answers
-        with status 500.
+        """Measures the time until the answer begins. After an exception, the outer middleware answers with status
+        500.
         """
         if scope["type"] != "http":
             await self._app(scope, receive, send)

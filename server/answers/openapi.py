@@ -1,5 +1,5 @@
-"""The OpenAPI document of the routes: the schema of a case, which FastAPI receives as bytes, and the schema of each
-answer.
+"""The OpenAPI document of the routes. The document has the schema of each answer, and the schema of a case, whose
+request body FastAPI sees only as bytes.
 """
 
 import math

@@ -1,8 +1,8 @@
-"""The live page: the files of Conoid, and two JavaScript libraries from an installed Python package.
+"""The live page: files of Conoid, and two JavaScript libraries from an installed Python package.
 
-The libraries three.js and ECharts are ES modules inside the Python package ``nicegui``. The metadata of ``nicegui`` has
-the paths of the files; the package is never imported, so its dependencies are not needed. All files of the page are
-read once, at the start of the server: no request opens a file.
+The libraries three.js and ECharts are ES modules inside the Python package ``nicegui``. The paths of the files are read
+from the metadata of ``nicegui``. The package itself is not imported, so that its dependencies need not be installed.
+All files of the page are read once, at the start of the server: no request opens a file.
 """
 
 import gzip
@@ -39,8 +39,8 @@ TESTED = {
         "f55227d12dac0eb037cae13b1992091746fc017a275748e4a1bebd0f6244e7e5",
     ),
 }
-"""Maps the path of a library in its address to the path in the package, and to its sha256 in the wheel of ``VERSION``
-on PyPI."""
+"""The files of the libraries, by the path in their address: path in the package, and SHA-256 hash in the wheel of
+``VERSION`` on PyPI."""
 _FOREVER = "public, max-age=31536000, immutable"
 """Caching header of a file whose address contains its version. The file is cached for a year, the longest time that RFC
 9111 allows."""
@@ -51,7 +51,7 @@ _TYPES = {
     ".svg": "image/svg+xml", ".png": "image/png",
 }  # fmt: skip
 _FILE = re.compile(r'((?:href|src)=)"([^"]*)"')
-"""Pattern of the address of a file in index.html."""
+"""Pattern of an address of a file in index.html."""
 _LEVEL = 6
 """Compression level of gzip. At this level 1.1 MB of files are compressed to 0.37 MB in 50 ms."""
 
@@ -68,7 +68,7 @@ class Library:
 
     @cached_property
     def zipped(self) -> bytes:
-        """Returns the compressed file, which is made at the first request."""
+        """Returns the file compressed by gzip; it is compressed at the first call."""
         return gzip.compress(self.plain, _LEVEL, mtime=0)
 
     @cached_property
@@ -76,7 +76,7 @@ class Library:
         return hashlib.sha256(self.plain).hexdigest()[:32]
 
     def tag(self, zipped: bool) -> str:
-        """Returns the ETag of the plain or the compressed file."""
+        """Returns the ETag of the file, plain or compressed."""
         return f'"{self._digest}{"-gzip" if zipped else ""}"'
 
 
@@ -107,8 +107,8 @@ def _tested(path: Path, digest: str) -> Library:
 
 
 def install(app: FastAPI, web: Path, *, auth: bool) -> str:
-    """Mounts the page at ``/`` and the JavaScript libraries at ``/lib``. Returns a text with the problem if the
-    libraries cannot be served, else an empty text. Raises OSError if the page cannot be read.
+    """Mounts the page at ``/`` and the JavaScript libraries at ``/lib``. Returns the reason why the libraries cannot
+    be served; empty if they can be served. Raises OSError if the page cannot be read.
     """
     found: Mapping[str, Library] = {}
     problem = ""
@@ -126,8 +126,8 @@ def install(app: FastAPI, web: Path, *, auth: bool) -> str:
 
 
 def _addressed(page: Mapping[str, Library]) -> tuple[dict[str, Library], dict[str, Library]]:
-    """Returns the files of the page by address, and again by addresses that contain a hash of all files. The file
-    index.html names all scripts with their hashed addresses, because a browser finds the imports of a script only when
+    """Returns the files of the page by address, and a second time by addresses that contain a hash of all files. The
+    file index.html names all scripts with these addresses, because a browser learns what a script imports only after
     the script has arrived.
     """
     if "index.html" not in page:
@@ -143,21 +143,21 @@ def _addressed(page: Mapping[str, Library]) -> tuple[dict[str, Library], dict[st
 
 
 def _is_shown(path: Path) -> bool:
-    """Whether a file belongs to the page, not to the Python package in the same folder."""
+    """Whether a file in the folder of the page belongs to the page; the folder is also a Python package."""
     return path.is_file() and not path.parent.name.startswith("_") and not path.name.startswith(("_", "."))
 
 
 class _Files:
-    """Serves files from memory by address. Browsers revalidate the files in ``fresh`` at each request, since the server
-    may have a newer version.
+    """Serves files from memory, by their addresses. A browser must ask at each use whether a file in ``fresh`` has
+    changed, because a newer server may have another version.
     """
 
     def __init__(self, fresh: Mapping[str, Library], lasting: Mapping[str, Library]) -> None:
         self._fresh, self._lasting = fresh, lasting
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Raises HTTPException 405 if the method is not GET or HEAD, and 404 if the address is unknown. This object
-        handles every address without a route.
+        """Raises HTTPException 405 if the method is not GET or HEAD, and 404 if the address is unknown. Every address
+        that has no route reaches this object.
         """
         address = scope["path"].removeprefix(scope["root_path"]).removeprefix("/")
         file, lasts = self._fresh.get(address) or self._lasting.get(address), address in self._lasting

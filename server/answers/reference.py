@@ -24,12 +24,12 @@ _TITLES = (
     ("Cases", ("/v1/cases", "/v1/case.schema.json", "/v1/materials")), ("Runs", ("/v1/runs", "/v1/table")),
     ("Sweeps", ("/v1/sweeps",)), ("Files that cases name", ("/v1/files",)), ("The server", ("/",)),
 )  # fmt: skip
-"""Title of each section, and the beginnings of the route paths that belong to the section."""
+"""Sections of the page: the title of each section, and the beginnings of the paths of its routes."""
 Operation = dict[str, Any]
 
 
 def page() -> str:
-    """Returns the whole reference page."""
+    """Returns the page as Markdown."""
     found: dict[str, list[str]] = {title: [] for title, _ in _TITLES}
     for path, operations in document()["paths"].items():
         title = next(title for title, starts in _TITLES if path.startswith(starts))

@@ -1,5 +1,5 @@
-"""The HTML report of a run that has ended. A separate program with limits makes the report once, and stores the report
-in the run's folder.
+"""The HTML report of a run that has ended. A separate program makes the report once and stores it in the run's folder.
+The program has limits of CPU time, memory and size.
 """
 
 import logging
@@ -23,28 +23,28 @@ _BOUNDS = Bounds(cpu=300, wall=300, memory=8 << 30, file=64 << 20)
 """Limits of the program that makes a report. The report of a run of 600,000 tets takes 40 s and 2 GB, and has a size of
 5 MB (reason of the chosen limits)."""
 _PATIENCE, _WAITING = 900.0, 8
-"""Longest time in s that a user waits for a report, and largest number of waiting reports (chosen values)."""
+"""Largest time in s that a user waits for a report, and largest number of reports that wait (chosen values)."""
 _AGAIN = 600.0
-"""Time in s after a failed report in which no new attempt is made; the answer is the reason of the failure (chosen
-value)."""
+"""Time in s after a failure for which no new attempt is made; until then the answer is the reason of the failure
+(chosen value)."""
 _MOST_FAILED = 1000
-"""Largest number of failed reports that are stored (chosen value)."""
+"""Largest number of failures that are stored (chosen value)."""
 _LEFT = ".*report-*"
-"""Pattern of the names of temporary files of reports. A server that was killed leaves incomplete temporary files."""
+"""Pattern of the names of temporary files of reports, which a server leaves if it is killed."""
 
 
 class Reporters(ThreadPool):
-    """Makes reports. The server makes only one report at a time for all users."""
+    """Makes the reports of all users, one at a time."""
 
     def __init__(self) -> None:
-        """Creates the pool of the program that makes reports."""
+        """Creates the object; a pool with one thread runs the program."""
         super().__init__(each=1, waiting=_WAITING, patience=_PATIENCE, most=1)
         self._failed: dict[Path, tuple[float, ServiceError]] = {}
-        """Failed reports, by folder of the run: time and reason of the failure."""
+        """Failed reports by the folder of their run: time and reason of the failure."""
 
     async def size_of(self, path: Path) -> int:
-        """Makes the report of the run in ``path`` if it is missing; returns the result of ``made``, the size of the
-        report. A report that has failed is not attempted again for ten minutes.
+        """Returns the size in bytes of the report of the run in the folder ``path``; makes the report if it is missing.
+        A report that has failed is not attempted again for ten minutes.
         """
         return await self.run(self._once, path)
 
@@ -64,9 +64,9 @@ class Reporters(ThreadPool):
 
 
 def made(path: Path) -> int:
-    """Returns the size in bytes of the report of the run in ``path``; makes the report if it is missing. The method
-    blocks until the report is made. Raises ServiceError: status 501 without the packages for drawing, 500 for a report
-    that cannot be made, 507 for a full disk.
+    """Returns the size in bytes of the report of the run in the folder ``path``; makes the report if it is missing. The
+    method returns only when the report is made. Raises ServiceError: status 501 without the packages for drawing, 500
+    for a report that cannot be made, 507 for a full disk.
     """
     target = path / report.NAME
     try:
@@ -91,7 +91,7 @@ def made(path: Path) -> int:
 
 
 def _make(path: Path, out: Path) -> None:
-    """Raises ServiceError with status 500 and the reason of the failed report."""
+    """Makes the report in the file ``out``. Raises ServiceError with status 500 and the reason if this fails."""
     with tempfile.TemporaryDirectory(prefix="conoid-report-") as folder:
         ended = bounded.run(
             report.PROGRAM, _BOUNDS, [str(path), str(out)], folder=Path(folder), LP_NUM_THREADS="1",

@@ -1,7 +1,6 @@
 """Rows of the table of runs as JSON.
 
-The common values of similar cases are sent once; each table row contains only the values that differ from the common
-values.
+Values that similar cases have in common are sent once; each row has only the values in which its case differs.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,10 +16,10 @@ from conoid.cases.reference.key_units import unit_of_key
 from .card import Card
 
 MOST_BYTES = 4 << 20
-"""Largest size in bytes of the table rows and cases of an answer. The limit is enough for 2,000 runs of a case with
-fifty results (reason of the chosen value)."""
+"""Largest size in bytes of the rows and cases of an answer. The limit is enough for 2,000 runs of a case with fifty
+results (reason of the chosen value)."""
 _ALIKE = 0.8
-"""Two cases are similar if at least this fraction of their keys is common (chosen value)."""
+"""Smallest fraction of common keys for which two cases count as similar (chosen value)."""
 _GROUPS = 50
 """Largest number of groups of similar cases in an answer; runs of further groups have no values. The values of 50
 groups of 300 values each are 0.6 MB (reason of the chosen number)."""
@@ -31,12 +30,13 @@ class Group:
     """A group of similar cases."""
 
     values: dict[str, Scalar]
-    """Values of the first case of the group."""
+    """Values of the first case of the group, by key."""
     results: dict[str, str] = field(default_factory=dict)
-    """Units of the results of all runs of the group by name, in order."""
+    """Units of the results of the runs of the group, by the name of the result; the order of the names is that of the
+    results in a row."""
 
     def takes(self, keys: Mapping[str, Scalar]) -> bool:
-        """Whether a case with these values is similar to the first case of the group."""
+        """Whether a case with these keys is similar to the first case of the group."""
         both = len(self.values.keys() & keys.keys())
         return both >= _ALIKE * (len(self.values) + len(keys) - both)
 
@@ -55,12 +55,12 @@ class Table:
         self.groups: list[Group] = []
         self.rows: list[msgspec.Raw] = []
         self.pending = 0
-        """Number of runs whose card is not read yet."""
+        """Number of runs whose card has not been read yet."""
         self._bytes = 0
 
     def add(self, line: dict[str, Any], card: Card | None) -> bool:
-        """Adds the table row of a run. ``line``: data of the run as in the list of runs. Returns False, and adds no
-        row, if the answer has reached its largest size.
+        """Adds the table row of a run. ``line``: data of the run as in the list of runs. Returns False without adding
+        the row if the answer would exceed its largest size.
         """
         groups = len(self.groups)
         row = msgspec.json.encode({**line, **self._of_card(card)})
@@ -95,8 +95,8 @@ class Table:
 
 
 def _others(common: Mapping[str, Scalar], values: Mapping[str, Scalar]) -> Iterator[tuple[str, Scalar | None]]:
-    """Yields the values that differ from ``common``; yields None for a key of ``common`` that is missing in
-    ``values``.
+    """Yields the keys whose value differs from that in ``common``, with the value of the case; None for a key that the
+    case lacks.
     """
     for key in {**common, **values}:
         if common.get(key) != values.get(key):

@@ -1,4 +1,6 @@
-"""The history of a run as an HTTP answer: columns over the reports, reduced to the requested number of points."""
+"""The history of a run as an HTTP answer: columns of values over the samples of the history, reduced to the requested
+number of points.
+"""
 
 import time
 from collections.abc import Sequence
@@ -14,9 +16,9 @@ from .history import History, Sample
 
 T = TypeVar("T")
 _NUMBERS = 100_000
-"""Largest product of ranks, phases and times in an answer: a megabyte of JSON (chosen value)."""
+"""Largest product of the numbers of ranks, phases and times in an answer: a megabyte of JSON (chosen value)."""
 _ANSWERS = 4
-"""Number of cached answers of a run, with different numbers of points (chosen value)."""
+"""Number of cached answers of a run; they differ in their numbers of points (chosen value)."""
 _progress = msgspec.json.Decoder(Progress)
 _load = msgspec.json.Decoder(Load)
 _counts = msgspec.json.Decoder(Counts)
@@ -24,7 +26,7 @@ _snapshot = msgspec.json.Decoder(Snapshot)
 
 
 def body(history: History, points: int) -> bytes:
-    """Returns the whole history as an HTTP answer. The answer for a run that has ended is made once and cached. The
+    """Returns the whole history as an HTTP answer. For a run that has ended, the answer is made once and cached. The
     caller must hold the lock of the history.
     """
     last, known = history.answers.get(points, (-1, b""))
@@ -68,14 +70,14 @@ class _Report(msgspec.Struct, frozen=True):
 
     @property
     def counted(self) -> Counts | Snapshot | None:
-        """Returns the newest message with numbers of fragments."""
+        """Returns the newest message that contains numbers of fragments."""
         messages = [message for message in (self.counts, self.snapshot) if message is not None]
         return max(messages, key=lambda message: (_counted(message), message.seq)) if messages else None
 
 
 def _read(sample: Sample) -> _Report | None:
-    """Decodes a report; returns None if the journal line with the load is damaged. Damaged journal lines of all other
-    types are omitted.
+    """Returns the decoded sample; None if its journal line with the load of the ranks is damaged. Other damaged lines
+    are left out.
     """
     load = _sound(_load, sample.load)
     if load is None:
@@ -94,7 +96,7 @@ def _sound(decoder: msgspec.json.Decoder[T], line: bytes) -> T | None:
 
 
 def _kept(history: History) -> list[Sample]:
-    """Returns the kept reports and the newest report."""
+    """Returns the samples that the history keeps, and the newest sample."""
     newest = history.newest
     if newest is None or (history.samples and history.samples[-1] is newest):
         return history.samples
@@ -139,7 +141,7 @@ def _sizes(message: Counts | Snapshot | None) -> dict[str, Any]:
 
 
 def _parts(reports: list[_Report]) -> dict[str, dict[str, list[float | None]]]:
-    """Returns energies by part and name, one value for each report; the result is empty for a case with one part."""
+    """Returns the energies of each part by name, one value per sample; empty for a case with one part."""
     parts = [report.progress.parts if report.progress is not None else {} for report in reports]
     names = {part: None for each in parts for part in each}
     return {
@@ -148,8 +150,8 @@ def _parts(reports: list[_Report]) -> dict[str, dict[str, list[float | None]]]:
 
 
 def _once(reports: list[_Report]) -> list[_Report]:
-    """Removes repeated times. A run that continued from a checkpoint reports some steps twice; the later report is
-    kept.
+    """Returns the samples without repeated times. A run that continued from a checkpoint reports some steps twice; the
+    later report is kept.
     """
     kept: list[_Report] = []
     for report in reversed(reports):
@@ -159,14 +161,14 @@ def _once(reports: list[_Report]) -> list[_Report]:
 
 
 def _shares(load: Load) -> dict[str, float]:
-    """Returns the fraction of CPU time that each phase takes, over all ranks."""
+    """Returns the fraction of the CPU time of all ranks that each phase takes."""
     total = sum(map(sum, load.phases.values()))
     return {name: sum(seconds) / total if total > 0.0 else 0.0 for name, seconds in load.phases.items()}
 
 
 def _ranks(loads: list[Load]) -> dict[str, Any]:
-    """Returns the CPU time of each rank and phase over the steps of a report, and the waiting time within ``exchange``,
-    s.
+    """Returns, for each rank and phase, the CPU time since the previous sample, s, and the waiting time within the
+    phase ``exchange``, s.
     """
     names = {name: None for load in loads for name in load.phases}
     return {

@@ -1,8 +1,8 @@
-"""Server-sent events (SSE) of a run, from its journal.
+"""The messages of a run as server-sent events (SSE), read from its journal.
 
 The stream reads the journal, not Zenoh, because the journal contains every message. A client that connects late,
-reconnects or reads slowly gets each event exactly once and in order. The supervisor checks the journal every 20 ms and
-wakes the streams when the journal has grown; clients of the Zenoh router do not use these streams.
+reconnects or reads slowly gets each event exactly once and in order. The supervisor checks the journal every 20 ms, and
+wakes the streams when the journal has grown.
 """
 
 import time
@@ -15,17 +15,19 @@ from ..service import Service
 
 MEDIA_TYPE = "text/event-stream"
 KEEP_ALIVE = 15.0
-"""Time in s without an event after which a comment is sent, so that proxies do not close the connection."""
+"""Time in s without a message after which a comment line is sent, so that proxies do not close the connection."""
 HEADERS = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
 
 
 def event(line: Line) -> bytes:
-    """Returns a journal line as an event; the header ``Last-Event-ID`` resumes from the id of the event."""
+    """Returns a journal line as a server-sent event. A client that reconnects sends the id of its last event in the
+    header ``Last-Event-ID``.
+    """
     return b"id: %d\nevent: %s\ndata: %s\n\n" % (line.seq, line.type.encode(), line.raw)
 
 
 async def events(service: Service, may: Pass, run_id: str, path: Path, after: int) -> AsyncIterator[bytes]:
-    """Yields every present and future event with ``seq`` above ``after``. The stream ends with the run, or when the
+    """Yields every event with ``seq`` above ``after``, present and future. The stream ends with the run, or when the
     time limit ``may`` expires.
     """
     tail, silent = Tail(path, after), time.monotonic()

@@ -24,7 +24,7 @@ _SHORT = 7
 
 @dataclass(frozen=True)
 class Snapshot:
-    """The JSON of a run at one moment, with its ETag."""
+    """The JSON of a run at one moment, and its ETag."""
 
     state: State
     body: bytes
@@ -36,7 +36,7 @@ class Snapshot:
 
 
 def snapshot(service: Service, run: Run) -> Snapshot:
-    """Returns all data of a run: state, progress and, after the end of the run, the outcome."""
+    """Returns the data of a run: state, progress, and after its end the outcome."""
     path = service.settings.runs / run.id
     made = _submission(path)
     progress = service.supervisor.progress(run.id)
@@ -53,8 +53,8 @@ def snapshot(service: Service, run: Run) -> Snapshot:
 
 
 def _submission(path: Path) -> folder.Submission | None:
-    """Returns the decoded file; None if the file is missing or damaged, because the state of the run does not depend on
-    this file.
+    """Returns the content of submission.json; None if the file is missing or damaged, because the answer is also useful
+    without it.
     """
     try:
         return folder.submission(path)
@@ -63,7 +63,7 @@ def _submission(path: Path) -> folder.Submission | None:
 
 
 def outcome(path: Path) -> Outcome | None:
-    """Returns the content of the file; None if the file is missing, damaged or not readable."""
+    """Returns the content of outcome.json; None if the file is missing, damaged or not readable."""
     try:
         return folder.outcome(path)
     except OSError:
@@ -94,8 +94,8 @@ def brief(service: Service, run: Run, labels: Mapping[str, str] | None = None) -
 
 
 def briefs(service: Service, runs: Sequence[Run]) -> list[dict[str, Any]]:
-    """Returns the data of several runs for the list, with the present states. The labels of runs are read from the
-    database, so that no file is opened.
+    """Returns the data of several runs for the list of runs, in their present states. The labels of runs are read from
+    the database, so that no file is opened.
     """
     labels = service.store.labels([run.id for run in runs])
     shorts = short_ids(service, runs)

@@ -1,4 +1,4 @@
-"""The SQLAlchemy engine of the server's database: how it is opened, which file it uses, and its error messages."""
+"""The SQLAlchemy engine of the server's database: opening it, its file, and its error messages."""
 
 import os
 import shutil
@@ -10,11 +10,11 @@ import sqlalchemy as sa
 from ..settings import StartError
 
 _BUSY = 2000
-"""Time in ms for which SQLite waits for a lock of another process (chosen value). The waiting time is longer than any
-transaction of this server, and shorter than the time limit of a request."""
+"""Time in ms for which SQLite waits for a lock of another process (chosen value). The time is longer than any
+transaction of this server takes, and shorter than the time limit of a request."""
 _TABLES = 1 << 16
-"""Bytes of free disk space below which SQLite cannot open a database, because SQLite needs space for its log and its
-shared memory. Measured: 32 KiB."""
+"""Number of bytes of free disk space below which SQLite cannot open a database, because it needs space for its log and
+its shared memory. Measured: 32 KiB."""
 
 
 class StoreError(StartError):
@@ -22,8 +22,8 @@ class StoreError(StartError):
 
 
 def failure(url: str | sa.URL, error: Exception, deed: str = "used") -> StoreError:
-    """Returns the message for a failed database: the file, or the address without the password, and the error.
-    ``deed``: name of the operation that failed.
+    """Returns the error for a database that cannot be used. The text of the error names the file, or the address
+    without the password, and the cause. ``deed``: what could not be done, such as "opened".
     """
     try:
         made = sa.make_url(url)
@@ -54,14 +54,14 @@ def engine_of(url: str | sa.URL) -> sa.Engine:
 
 
 def _tune(connection: Any, _record: object) -> None:
-    """Switches SQLite to write-ahead logging (WAL), so that readers do not wait for a writer."""
+    """Switches SQLite to write-ahead logging, so that readers do not wait for a writer."""
     for pragma in ("journal_mode=wal", f"busy_timeout={_BUSY}"):
         connection.execute(f"pragma {pragma}").close()
     connection.create_function("lower", 1, _lower, deterministic=True)
 
 
 def _lower(text: str | None) -> str | None:
-    """Converts all letters to lower case; the function of SQLite converts only ASCII letters."""
+    """Converts all letters of a text to lower case; SQLite itself converts only ASCII letters."""
     return text if text is None else str(text).lower()
 
 

@@ -1,8 +1,9 @@
-"""Identity of a server: the folder of runs and the database each store the identity of the other.
+"""The identity of a server, which is stored both in its folder of runs and in its database.
 
-The server refuses to start with the folder or the database of another server. A second server on the same database
-would mark the runs of the first server as lost. A server on a copy of a folder would stop the workers of the original
-folder. The command ``adopt`` binds a folder and a database that were moved, or restored from a backup.
+A server refuses to start if its folder and its database belong to different servers. Without this check a second server
+with the same database would mark the runs of the first server as lost, and a server with a copy of a folder would stop
+the workers of the original folder. The command ``adopt`` binds a folder and a database that were moved, or restored
+from a backup.
 """
 
 import secrets
@@ -19,8 +20,8 @@ from .store import Bond, Store
 
 FILE = "server.identity"
 _MOST = 1 << 16
-"""Largest number of bytes of the identity file that are read; the file has some hundred bytes (reason of the chosen
-limit)."""
+"""Largest number of bytes that are read from the identity file, which has some hundred bytes (reason of the chosen
+value)."""
 
 
 class IdentityError(SettingsError):
@@ -31,7 +32,7 @@ class IdentityError(SettingsError):
 
 @dataclass(frozen=True)
 class Pair:
-    """The identities that folder and database store; None for a new folder or database."""
+    """The identities that the folder and the database have stored; None if nothing is stored yet."""
 
     place: str
     folder: Bond | None
@@ -68,7 +69,9 @@ def adopt(runs: Path, store: Store) -> str:
 
 
 def _look(runs: Path, store: Store) -> Pair:
-    """Reads the identity file of the folder of runs. Raises IdentityError if the identity file is damaged."""
+    """Returns the identities that the folder of runs and the database have stored. Raises IdentityError if the identity
+    file cannot be read.
+    """
     place = str(runs.resolve())
     try:
         folder = msgspec.json.decode(whole.read(runs / FILE, _MOST), type=Bond)
@@ -82,9 +85,7 @@ def _look(runs: Path, store: Store) -> Pair:
 
 
 def _wrong(found: Pair) -> str:
-    """Returns the reason why folder and database do not belong together; empty if they belong together or can be
-    bound.
-    """
+    """Returns why the folder and the database cannot be used together; empty if they can."""
     if found.folder is not None and found.folder.place != found.place:
         return f"this folder is a copy of {found.folder.place}, or was moved from there"
     if found.database is None:

@@ -1,7 +1,7 @@
 """The server's tables: runs, labels, idempotency keys, tokens.
 
-The database is SQLite by default, or PostgreSQL by URL. Runs, labels and keys are an index over the runs' folders
-and can be made again from the folders; tokens are stored in the database only.
+The database is SQLite by default, or PostgreSQL by URL. Runs, labels and idempotency keys can be made again from the
+folders of the runs; tokens are stored in the database only.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -41,7 +41,7 @@ class Token:
 
 
 class Bond(msgspec.Struct, frozen=True):
-    """Identity that the database stores: the server, and the path ``place`` of the folder of runs."""
+    """The server to which the database belongs: its identity, and the path ``place`` of its folder of runs."""
 
     server: str
     place: str
@@ -58,8 +58,8 @@ class KeptCard:
 
 
 class Store:
-    """The database of the server. Methods of the database may be called from any thread. Each method of the database is
-    one transaction, and raises SQLAlchemyError on failure.
+    """The database of a server. All methods of this class may be called from any thread. Each method is one
+    transaction, and raises SQLAlchemyError on failure.
     """
 
     def __init__(self, url: str | sa.URL) -> None:
@@ -67,8 +67,8 @@ class Store:
         try:
             self._engine = engine_of(url)
             self.unlabelled = not sa.inspect(self._engine).has_table(LABELS.name)
-            """True if the labels of all runs must be read from their folders, because the database is new or from an
-            older version."""
+            """True if the database is new or from an older version, so that the labels must be read from the folders of
+            the runs."""
             META.create_all(self._engine)
             _complete(self._engine)
             self._file = identity_of(self._engine)
@@ -93,20 +93,20 @@ class Store:
     # The server -------------------------------------------------------------------------------------------------------
 
     def bond(self) -> "Bond | None":
-        """Returns the server and the folder of runs that the database stores; None for a new database."""
+        """Returns the server to which the database belongs; None for a new database."""
         with self._engine.connect() as connection:
             row = connection.execute(sa.select(BONDS.c.server, BONDS.c.place)).first()
         return None if row is None else Bond(row[0], row[1])
 
     def bind(self, bond: "Bond") -> None:
-        """Stores server and folder of runs in a new database. If the database already belongs to another server, the
-        database is not changed.
+        """Stores the server to which a new database belongs. If the database already belongs to a server, nothing is
+        changed.
         """
         with suppress(sa.exc.IntegrityError), self._engine.begin() as connection:
             connection.execute(sa.insert(BONDS).values(number=_ONLY, server=bond.server, place=bond.place))
 
     def rebind(self, bond: "Bond") -> None:
-        """Replaces the server and the folder of runs that the database stores."""
+        """Replaces the server to which the database belongs."""
         with self._engine.begin() as connection:
             connection.execute(sa.delete(BONDS))
             connection.execute(sa.insert(BONDS).values(number=_ONLY, server=bond.server, place=bond.place))
@@ -145,7 +145,7 @@ class Store:
         return found
 
     def save(self, run: Run) -> None:
-        """Updates the table row of a run."""
+        """Updates the row of a run."""
         with self._engine.begin() as connection:
             self._put(connection, run)
 
@@ -173,8 +173,8 @@ class Store:
             return {row["id"]: _run(row) for found in rows for row in found.mappings()}
 
     def page(self, owner: str, chosen: Chosen, before: str | None, limit: int) -> list[Run]:
-        """Returns at most ``limit`` runs of ``owner`` that match the filters ``chosen``, newest first; all are older
-        than the run ``before``.
+        """Returns the newest runs of ``owner`` that match the filters ``chosen``, at most ``limit``, newest first.
+        ``before``: id; only runs with smaller ids are returned.
         """
         query = sa.select(RUNS).where(*chosen.where(owner)).order_by(RUNS.c.id.desc()).limit(limit)
         if before is not None:
@@ -183,8 +183,8 @@ class Store:
             return [_run(row) for row in connection.execute(query).mappings()]
 
     def ids_about(self, owner: str, first: str, last: str) -> list[str]:
-        """Returns the sorted ids of the runs of ``owner`` from ``first`` to ``last``, and one id before and after
-        them.
+        """Returns the sorted ids of the runs of ``owner`` from ``first`` to ``last``, and the ids directly before and
+        after this range.
         """
         own = sa.select(RUNS.c.id).where(RUNS.c.owner == owner)
         before = own.where(RUNS.c.id < first).order_by(RUNS.c.id.desc()).limit(1)
@@ -200,7 +200,7 @@ class Store:
             return [KeptCard(*row) for rows in found for row in rows]
 
     def keep_cards(self, cards: Sequence[KeptCard], titles: Mapping[str, str]) -> None:
-        """Stores cards; replaces earlier cards of the same runs. Runs of an older database get their ``titles``."""
+        """Stores cards; replaces earlier cards. ``titles``: titles of cases that an older server did not store."""
         with self._engine.begin() as connection:
             for card in cards:
                 connection.execute(sa.delete(CARDS).where(CARDS.c.run == card.run))
@@ -228,7 +228,7 @@ class Store:
             return {row["id"]: _run(row) for row in connection.execute(query).mappings()}
 
     def taken(self) -> list[Took]:
-        """Returns, for every run that has ended, how many cores it used and when."""
+        """Returns the use of cores by every run that has ended: number of cores, start and end."""
         query = sa.select(RUNS.c.owner, RUNS.c.ranks * RUNS.c.threads, RUNS.c.started, RUNS.c.finished)
         ended = query.where(RUNS.c.state.not_in(OPEN), RUNS.c.started > 0.0)
         with self._engine.connect() as connection:
@@ -241,7 +241,7 @@ class Store:
             return {State(state): number for state, number in connection.execute(query).all()}
 
     def run_of_key(self, owner: str, key: str) -> str | None:
-        """Returns the run that ``owner`` made with this idempotency key."""
+        """Returns the id of the run that ``owner`` has submitted with this idempotency key; None if there is none."""
         query = sa.select(KEYS.c.run).where(KEYS.c.owner == owner, KEYS.c.key == key)
         with self._engine.connect() as connection:
             return connection.execute(query).scalar_one_or_none()
@@ -268,14 +268,14 @@ class Store:
             return [_token(row) for row in connection.execute(query).mappings()]
 
     def revoke(self, token_id: str) -> bool:
-        """Revokes a token; returns False if the token is unknown."""
+        """Revokes a token. Returns False if there is no such token."""
         query = sa.update(TOKENS).where(TOKENS.c.id == token_id, TOKENS.c.revoked.is_(False)).values(revoked=True)
         with self._engine.begin() as connection:
             return connection.execute(query).rowcount == 1
 
 
 def _complete(engine: sa.Engine) -> None:
-    """Adds missing columns to the table of runs of an older server; the columns get their default value."""
+    """Adds the columns that the table of an older server lacks, with their default values."""
     there = {column["name"] for column in sa.inspect(engine).get_columns(RUNS.name)}
     with engine.begin() as connection:
         for column in (each for each in RUNS.columns if each.name not in there):
@@ -284,7 +284,7 @@ def _complete(engine: sa.Engine) -> None:
 
 
 def _parts(items: Sequence[str]) -> Iterator[Sequence[str]]:
-    """Yields the ids in groups that fit into one SQL statement."""
+    """Yields the ids in groups of the largest number for one SQL statement."""
     return (items[n : n + _AT_ONCE] for n in range(0, len(items), _AT_ONCE))
 
 

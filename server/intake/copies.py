@@ -21,18 +21,18 @@ from .uploads import Uploads, give
 _LACKING = "you have uploaded no such file, or it has been removed; upload it first (PUT /v1/files/{sha256})"
 _NAMING = re.compile(rb"""path["']?[ \t]*[=:]|\\[uUx]""")
 Source = Callable[[FileName, Path], None]
-"""Function that writes a file, which the case names, to a path. Raises FileNotFoundError if the file does not exist;
-raises OSError."""
+"""Function that writes a file that a case names to a path. Raises FileNotFoundError if the file does not exist; raises
+OSError."""
 
 
 def of_owner(sent: Uploads, owner: str) -> Source:
-    """Source of files for a run: the files that a user has uploaded."""
+    """Returns the source of files for a run that a user submits: the files that the user has uploaded."""
     return lambda file, target: sent.give(owner, file.sha256, target)
 
 
 def of_run(folder: Path) -> Source:
-    """Source of files for a run: the files of another run of the same user. Raises ServiceError with status 409 if the
-    other run has lost a file.
+    """Returns the source of files for a run that continues another run: the files of that run. The source raises
+    ServiceError with status 409 if that run has lost a file.
     """
 
     def put(file: FileName, target: Path) -> None:
@@ -49,8 +49,8 @@ def of_run(folder: Path) -> Source:
 
 
 def fill(files: Sequence[FileName], source: Source, folder: Path) -> None:
-    """Adds a copy of each file to a folder; flushes the copies to disk before it returns. Raises CaseError if files are
-    missing; raises OSError.
+    """Adds a copy of each file to a folder, and flushes the copies to disk. Raises CaseError if files are missing;
+    raises OSError.
     """
     place = folder / layout.FILES
     if files:
@@ -72,7 +72,7 @@ def fill(files: Sequence[FileName], source: Source, folder: Path) -> None:
 @contextmanager
 def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Path]:
     """Creates a temporary folder with copies of the files, arranged as in the folder of a run. If the server is killed,
-    the next server removes the temporary folder. Raises the errors of the function ``fill``.
+    the next server removes this folder. Raises the errors of the function ``fill``.
     """
     place = runs / f"{APART}{secrets.token_hex(8)}"
     place.mkdir(0o700)
@@ -85,5 +85,5 @@ def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Pat
 
 
 def names_files(body: bytes) -> bool:
-    """Whether the text of a case may name files: the text contains a key ``path``, or escaped characters."""
+    """Whether the text of a case may name files: it contains a key ``path``, or escaped characters."""
     return _NAMING.search(body) is not None

@@ -1,5 +1,5 @@
-"""Stored sweeps. Each sweep is a plain file ``<runs>/sweeps/<id>.json``, and the server keeps a copy of all sweeps in
-memory.
+"""The stored sweeps (a sweep: one case at several points, each with changed values). Each sweep is a plain file
+``<runs>/sweeps/<id>.json``. The server also keeps all sweeps in memory.
 """
 
 from collections.abc import Iterator
@@ -27,23 +27,23 @@ class Plan(msgspec.Struct, kw_only=True, frozen=True):
     key: str | None
     digest: str
     at_once: int | None
-    """Largest number of concurrent runs of the sweep; None: only the number of cores of the server is a limit."""
+    """Largest number of runs of the sweep that run at the same time; None: only the cores of the server limit it."""
     points: list[dict[str, Any]]
     runs: list[str] = []
     case: dict[str, Any] | None = None
-    """Changed values of each point; kept until all runs are accepted."""
+    """The case of the sweep, until all runs are accepted."""
     tries: list[int] = []
     """Number of repetitions of each point; empty if no point was repeated."""
     repeated: list[int] = []
-    """Points that are repeated, until all new runs are accepted; the field ``earlier`` has the previous runs."""
+    """Points that are being repeated, until all new runs are accepted; ``earlier`` has their previous runs."""
     earlier: list[str] = []
     search: Search | None = None
     """Last report of an adaptive sweep, whose client chooses the points."""
     reported: float = 0.0
-    """Time of the last report of an adaptive sweep, Unix s."""
+    """Unix time of the last report of an adaptive sweep, s."""
     cancelled: float = 0.0
-    """Start time ``began`` of the client command that was cancelled on the server. A command whose start time equals
-    this value must submit no more runs."""
+    """Start time ``began`` of the client command whose adaptive sweep was cancelled on the server, Unix time, s. The
+    command with this start time must submit no more runs."""
 
     @property
     def whole(self) -> bool:
@@ -58,13 +58,13 @@ class Plan(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def wanted(self) -> list[int]:
-        """Returns the points that get a run when the sweep is completed."""
+        """Returns the indices of the points for which runs must be accepted."""
         return self.repeated or list(range(len(self.points)))
 
 
 class Plans:
-    """All sweeps of a server. All methods of this class may be called from any thread. The caller makes sure that only
-    one thread at a time changes a sweep.
+    """All sweeps of a server. All methods of this class may be called from any thread. Only one thread at a time may
+    change a sweep; the caller ensures this.
     """
 
     def __init__(self, settings: Settings) -> None:

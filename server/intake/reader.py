@@ -1,4 +1,6 @@
-"""Reads cases in separate processes with limits (module ``reading``); users are served in turn."""
+"""Reading of cases in separate processes with limits (module ``reading``). Cases of different users are read in
+turn.
+"""
 
 import atexit
 import logging
@@ -21,38 +23,38 @@ from .reading import CPU, PID, WALL, Answer, Question, Reading, WrongCaseError
 
 _log = logging.getLogger("conoid.server")
 _LOAD = 30.0
-"""Time in s in which the reading program must load its modules; loading takes half a second (reason of the chosen
-limit)."""
+"""Time in s within which the reading program must have loaded its modules; it takes half a second (reason of the chosen
+value)."""
 _FORK = 10.0
-"""Time in s in which the reading program must begin with a case; a slower program is replaced. A program usually begins
-with a case within 10 ms (reason of the chosen limit)."""
+"""Time in s within which the reading program must start to read a case; a program that is slower is replaced. The
+reading program usually starts within 10 ms (reason of the chosen value)."""
 _REST = 5.0
-"""Time in s, in addition to ``WALL``, after which the server kills the process that reads a case (chosen value)."""
+"""Time in s after the limit ``WALL`` at which the server kills the process that reads a case (chosen value)."""
 _WAITING = 100
-"""Largest number of waiting request bodies of one owner; each body may have 1 MiB (reason of the chosen limit)."""
+"""Largest number of request bodies of one owner that wait; each has at most 1 MiB (reason of the chosen value)."""
 CASE, SWEEP, FILES = 120.0, 900.0, 300.0
-"""Longest times in s for reading, including the waiting time (chosen values): for a case, for all cases of a sweep, and
-for a case with files."""
+"""Largest times in s for a request, including the time that it waits: for a case, for all cases of a sweep, and for a
+case with files (chosen values)."""
 
 
 def pool(patience: float) -> ThreadPool:
-    """Returns a pool of threads; the pool reads as many cases at a time as the machine has cores. The pool limits each
-    owner, so that a single owner never uses all threads.
+    """Returns a pool of threads that reads as many cases at once as the machine has cores. A single owner never uses
+    all threads of the pool.
     """
     places = max(2, usable_cores())
     return ThreadPool(each=places - 1, waiting=_WAITING, patience=patience, most=places)
 
 
 def surveyors() -> ThreadPool:
-    """Returns a pool of threads for cases with files: one case of each owner at a time, and as many cases of all owners
-    as the machine has cores.
+    """Returns a pool of threads for cases with files. The pool reads one case of each owner at once, and at most as
+    many cases as the machine has cores.
     """
     return ThreadPool(each=1, waiting=_WAITING, patience=FILES, most=max(2, usable_cores()))
 
 
 class Reader:
-    """Client of a program that reads cases. The reading program is started at the first case, and is started again if
-    it has ended or hangs. All methods of this class may be called from any thread.
+    """Client of the program that reads cases. The program is started for the first case, and again after it has ended
+    or does not answer. All methods of this class may be called from any thread.
     """
 
     def __init__(self) -> None:
@@ -77,8 +79,8 @@ class Reader:
         return answer.reading
 
     def _ask(self, question: bytes) -> bytes:
-        """Returns a connection to the reading program; starts a new program if necessary. Raises ServiceError with
-        status 503 if the program does not start.
+        """Returns the answer of the reading program to a question; starts the program if necessary. Raises ServiceError
+        with status 503 if the program does not start.
         """
         error: OSError | None = None
         for _ in range(2):
@@ -100,7 +102,7 @@ class Reader:
             return self._program
 
     def close(self) -> None:
-        """Ends the reading program. A process that reads a case at this time completes the case."""
+        """Ends the reading program. A process that is reading a case at this time finishes its case."""
         with self._lock:
             if self._program is not None:
                 self._program.close()
@@ -152,8 +154,8 @@ class _Program:
 
 
 def _answer(connection: socket.socket, pid: int, question: bytes) -> bytes:
-    """Returns the answer of the process that reads a case; empty if the process reached its limits. Raises ServiceError
-    with status 503 if no process could be forked.
+    """Returns the answer of the process that reads a case; empty if the process has reached its limits. Raises
+    ServiceError with status 503 if no process could be forked.
     """
     with connection:
         connection.settimeout(WALL + _REST)

@@ -1,9 +1,9 @@
 """``python -m conoid.server.intake.reading``: reads cases, each in a separate process with limits.
 
-The time and memory that a case needs for reading are unknown beforehand. The reading program loads all modules once and
-forks a process for each case. Therefore reading a case takes milliseconds, and a case that needs too much time or
-memory ends only its own process. Standard input of the reading program is a socket that carries a connection for each
-case; the program ends with the server. The reading program has one thread, since a fork copies one thread only.
+How much time and memory the reading of a case needs is not known before. The program loads all modules once, and then
+forks one process for each case. Therefore a case is read within milliseconds, and a case that needs too much time or
+memory ends only its own process. The standard input of the program is a socket; the server sends a connection for each
+case over it. The program ends with the server. The program has only one thread, because fork copies only one thread.
 """
 
 import os
@@ -35,35 +35,34 @@ from ..requests.limits import Limits
 
 CPU, WALL, MEMORY = 5, 20, 1 << 30
 """Limits for reading a case: CPU time in s, wall time in s, memory in bytes. The largest shipped case takes 0.1 s and
-100 MB, and a machine may be busy (reason of the chosen limits)."""
+100 MB; the limits are larger because a machine may be busy (chosen values)."""
 _NICE = 5
-"""Increment of the nice value of a process that reads a case (chosen value), so that the server has a higher
-priority."""
+"""Increase of the nice value of a process that reads a case, so that the server has priority over it (chosen value)."""
 _SHIPPED = "demo"
-"""Name of a shipped case that is read before all other cases. The chosen case is small and has a material of the
+"""Name of a shipped case that the program reads before any other case. This case is small and has a material of the
 library."""
 _MOST_FILES = 1000
-"""Largest number of files in the list of a case with problems (chosen value)."""
+"""Largest number of files that are listed for a case with problems (chosen value)."""
 _UNREAD = "was not read yet; the run will read the file"
 PID = 4
-"""Number of bytes of the process number, which each forked process sends first."""
+"""Number of bytes with which each forked process first sends its process number."""
 
 
 class Question(msgspec.Struct, frozen=True, kw_only=True):
-    """A request body with a case, the content type of the body, and the resources that the case may use."""
+    """A request body that contains a case, its content type, and the resources that the case may use."""
 
     body: bytes
     json: bool
     limits: Limits
     survey: bytes | None = None
-    """Survey of the mesh files that the case names (conoid.cases.reading.survey). An empty value means that no survey
-    could be made. None: no survey was made yet; a case with files is read and checked, but not estimated."""
+    """Survey of the mesh files that the case names (conoid.cases.reading.survey). An empty survey means that no survey
+    could be made. None means that no survey has been made yet; a case with files is then checked but not estimated."""
     folder: str = ""
-    """Folder of the files that the case names."""
+    """Folder with the files that the case names."""
 
 
 class FileName(msgspec.Struct, frozen=True, kw_only=True):
-    """A file that the case names, and the key of the table with its name."""
+    """A file that a case names, and the key of the table that names it."""
 
     key: str
     path: str
@@ -71,7 +70,7 @@ class FileName(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class WrongCaseError(CaseError):
-    """Error: a case has problems; the error has the problems and the files that the case names."""
+    """Error: a case has problems. The exception has the problems and the files that the case names."""
 
     def __init__(self, problems: Iterable[Problem], files: Sequence[FileName]) -> None:
         """Creates the error with the ``problems`` of the case and its ``files``."""
@@ -80,7 +79,7 @@ class WrongCaseError(CaseError):
 
 
 class Reading(msgspec.Struct, frozen=True, kw_only=True):
-    """A case that can be run on this server, with the data that the server needs."""
+    """A case that can run on this server, with the data of the case that the server needs."""
 
     name: str
     title: str
@@ -97,12 +96,12 @@ class Reading(msgspec.Struct, frozen=True, kw_only=True):
     doubts: list[Problem]
     files: list[FileName] = []
     survey: bytes = b""
-    """Survey of the mesh files as JSON; empty if no survey was made."""
+    """Survey of the mesh files as JSON; empty if none was made."""
 
 
 class Answer(msgspec.Struct, frozen=True, kw_only=True):
-    """Answer of the reading program: a case that was read, or every problem of the case. ``crash``: traceback of an
-    error in the reading program.
+    """Answer of the reading program: the case, or every problem of the case. ``crash``: traceback of an unexpected
+    exception in the program.
     """
 
     reading: Reading | None = None
@@ -146,7 +145,7 @@ def _files(case: Case) -> list[FileName]:
 
 
 def _named(question: Question) -> list[FileName]:
-    """Returns the files of a case with problems; empty if the text of the case cannot be read."""
+    """Returns the files that a case with problems names; empty if its text cannot be read."""
     try:
         text = _text(question.body)
         return _names(json_data(text) if question.json else toml_data(text))[:_MOST_FILES]
@@ -161,8 +160,8 @@ def _names(data: Mapping[str, Any]) -> list[FileName]:
 def _weighed(
     case: Case, data: Mapping[str, Any], question: Question
 ) -> tuple[Case, dict[str, int | float], list[Problem]]:
-    """Returns the case with its number of threads, the needed resources and the warnings. Raises CaseError if the case
-    cannot be run on this server.
+    """Returns the case with its number of threads, the resources that it needs, and its warnings. Raises CaseError if
+    the case cannot be run on this server.
     """
     survey = from_json(question.survey) if question.survey else Survey()
     if survey.refused:
@@ -171,7 +170,7 @@ def _weighed(
     case = limits.on_threads(case, expected.elements, question.limits)
     if expected.clock is not None:
         expected = replace(expected, clock=clock_time(case, expected.costs, expected.breaking))
-    # Contact between parts is reported for mesh files only: for other shapes the search takes seconds.
+    # Contact between parts is searched only if the case has mesh files: for other shapes the search takes seconds.
     unread = [problem((file.key, "path"), file.path, _UNREAD) for file in _files(case) if question.survey == b""]
     odd = [*unread, *bare_numbers(data), *warned(case, expected, survey, survey.touching)]
     return case, limits.figures(expected), odd
@@ -198,9 +197,7 @@ def _text(body: bytes) -> str:
 
 
 def main() -> int:
-    """Answers requests to read a case until standard input ends. The reading program sends one byte when it is ready
-    for requests.
-    """
+    """Answers requests to read a case until standard input ends. The program first sends one byte when it is ready."""
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)
@@ -213,8 +210,8 @@ def main() -> int:
 
 
 def _next(control: socket.socket) -> bool:
-    """Answers one case; returns False at the end of standard input. If no process can be forked for the case, the
-    answer is empty.
+    """Answers one case; returns False at the end of standard input. If no process can be forked, the answer is
+    empty.
     """
     message, descriptors, _, _ = socket.recv_fds(control, 1, 1)
     for descriptor in descriptors:
@@ -225,7 +222,7 @@ def _next(control: socket.socket) -> bool:
 
 
 def _warm() -> None:
-    """Reads a shipped case, so that each forked process starts with the objects that the first case creates
+    """Reads a shipped case, so that each forked process already has the objects that the first case creates
     (validators, materials).
     """
     none = Limits(slots=1 << 20, elements=None, steps=None, memory=None, core_seconds=None, wall_time=None)
@@ -234,9 +231,7 @@ def _warm() -> None:
 
 
 def _child(connection: socket.socket) -> None:
-    """Answers one case, then exits without the clean-up of the interpreter, because only the parent process may clean
-    up.
-    """
+    """Answers one case and then exits without the clean-up of the interpreter, which only the parent process may do."""
     code = 1
     try:
         _limit()

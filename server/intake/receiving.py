@@ -1,9 +1,9 @@
-"""Receives uploaded files: writes the files to disk, from the first missing byte, and verifies the sha256.
+"""Receiving of uploaded files: writes the bytes to disk from the first missing byte on, and verifies the SHA-256 hash.
 
-A PUT with ``Content-Range: bytes FIRST-LAST/SIZE`` is a partial PUT of RFC 9110, 14.5. A transfer continues at the end
-of the stored part; the header ``Upload-Offset`` (draft-ietf-httpbis-resumable-upload) of HEAD and of every answer gives
-this position. A PUT without the header ``Content-Range`` sends the file from its first byte. Stored bytes of an upload
-are kept when a connection breaks or the server is killed.
+A PUT with ``Content-Range: bytes FIRST-LAST/SIZE`` is a partial PUT of RFC 9110, 14.5. An interrupted transfer
+continues after the stored bytes. The header ``Upload-Offset`` (draft-ietf-httpbis-resumable-upload) of HEAD and of
+every answer gives their number. A PUT without the header ``Content-Range`` sends the whole file. Stored bytes of an
+incomplete file are kept if the connection breaks or the server is killed.
 """
 
 import asyncio
@@ -24,21 +24,21 @@ from .uploads import Part, Upload, Uploads
 
 _RANGE = re.compile(r"bytes (?:(\d{1,18})-(\d{1,18})|\*)/(\d{1,18})")
 _GATHERED = 1 << 18
-"""Number of bytes that are collected before a write; larger writes were not faster (measured)."""
+"""Number of bytes that are collected before they are written; larger numbers were not faster (measured)."""
 _SLICE = 1 << 25
-"""Number of bytes that are hashed in one task, which takes 0.1 s; other requests of the user are served between two
-tasks (chosen value)."""
+"""Number of bytes that one task hashes, in 0.1 s; other requests of the user are handled between two tasks (chosen
+value)."""
 _SILENCE = 30.0
-"""Time in s within which the next piece of an upload must arrive: the limit of all request bodies (chosen value)."""
+"""Time in s within which the next piece of an upload must arrive, the limit of all request bodies (chosen value)."""
 _STALLED = 5.0
-"""Time in s without data after which another connection may continue with a file (chosen value for broken
-connections)."""
+"""Time in s without new bytes after which another connection may continue the upload; the first connection is probably
+broken (chosen value)."""
 
 
 @dataclass(frozen=True)
 class Span:
     """Byte range of a file of ``total`` bytes, from ``first`` to ``end`` (exclusive). ``anew``: whether the request
-    body replaces the stored bytes.
+    body replaces all stored bytes.
     """
 
     first: int
@@ -59,10 +59,10 @@ class _Transfer:
     patience: asyncio.Timeout | None = None
 
     def give_up(self) -> None:
-        """Stops this transfer at once, because another connection continues with the file."""
+        """Stops this transfer at once, because another connection continues the upload."""
         self.given_up = True
         if self.patience is not None:
-            with suppress(RuntimeError):  # this transfer stops waiting for its request body
+            with suppress(RuntimeError):  # the transfer then stops waiting for its request body
                 self.patience.reschedule(0.0)
 
 
@@ -79,9 +79,9 @@ class Receiver:
     async def receive(
         self, request: Request, owner: str, sha256: str, check: Callable[[], Awaitable[None]]
     ) -> tuple[Upload, bool]:
-        """Receives the request body; returns the stored file, and whether the file is complete now. ``check`` raises an
-        error if the token is no longer valid. Raises ServiceError with status 400, 408, 409, 411, 413, 415, 422, 429,
-        503 or 507.
+        """Receives the request body. Returns the stored file, and whether this request has completed it. ``check``
+        raises an error if the token is no longer valid. Raises ServiceError with status 400, 408, 409, 411, 413, 415,
+        422, 429, 503 or 507.
         """
         span = span_of(request)
         place_of(request).lengthen()
@@ -106,8 +106,8 @@ class Receiver:
             transfer.over.set()
 
     async def _begun(self, owner: str, sha256: str) -> _Transfer:
-        """Registers the connection that sends bytes of a file. Only one connection at a time may send bytes of a file.
-        Raises ServiceError with status 409 if another connection sends bytes of the file.
+        """Registers a connection as the only one that sends bytes of the file. Raises ServiceError with status 409 if
+        another connection is sending bytes of the file.
         """
         while (other := self._open.get((owner, sha256))) is not None:
             if other.busy or time.monotonic() - other.received < _STALLED:
@@ -118,8 +118,8 @@ class Receiver:
         return made
 
     def _opened(self, owner: str, sha256: str, span: Span) -> Part | Upload:
-        """Returns the incomplete file, open at the first byte of the body, or the complete file if it exists. Raises
-        ServiceError with status 409, 413, 429 or 507; raises OSError.
+        """Returns the incomplete file, opened at the first byte of the request body; if the file is already complete,
+        returns the complete file. Raises ServiceError with status 409, 413, 429 or 507; raises OSError.
         """
         known = self._sent.find(owner, sha256)
         if known is not None and known.whole:
@@ -129,8 +129,8 @@ class Receiver:
     async def _taken(
         self, request: Request, transfer: _Transfer, part: Part, check: Callable[[], Awaitable[None]]
     ) -> None:
-        """Writes the request body while it arrives. Stored bytes are kept after any error. Raises ServiceError with
-        status 400, 401, 408 or 409, OSError, and the errors of ``check``.
+        """Writes the request body to disk as it arrives. Bytes that were written are kept after any error. Raises
+        ServiceError with status 400, 401, 408 or 409, OSError, and the errors of ``check``.
         """
         gathered, chunks = bytearray(), aiter(request.stream())
         try:
@@ -146,8 +146,8 @@ class Receiver:
                 await self._pool.run(part.write, bytes(gathered))
 
     async def _verify(self, owner: str, sha256: str, part: Part) -> None:
-        """Renames the verified file to its final name; flushes the file to disk before it returns. Raises ServiceError
-        with status 422, and removes the bytes, if the hash differs.
+        """Verifies the hash of the file, gives the file its final name, and flushes it to disk. If the hash differs,
+        removes the file and raises ServiceError with status 422.
         """
         total, offset = hashlib.sha256(), 0
         while offset < part.size:
@@ -181,7 +181,7 @@ def _in_progress() -> ServiceError:
 
 
 def _hashed(total: "hashlib._Hash", part: Part, offset: int) -> int:
-    """Adds a slice of the file to the digest; returns the end of the slice. Raises OSError if the file cannot be
+    """Adds the next slice of the file to the hash; returns the end of the slice. Raises OSError if the file cannot be
     read.
     """
     end = min(part.size, offset + _SLICE)

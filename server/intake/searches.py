@@ -1,5 +1,5 @@
-"""Adaptive sweeps. The client of an adaptive sweep selects the points, submits each point as a run, and sends a report;
-the server stores the report.
+"""Adaptive sweeps (searches): the client chooses the next point from the results so far, submits it as a run, and sends
+a report, which the server stores.
 """
 
 import re
@@ -18,13 +18,13 @@ from ..runs import folder
 from .plans import Plan, Plans
 
 _NAME = re.compile(r"[0-9a-f]{16,64}")
-"""Pattern of the name of an adaptive sweep. The client computes the name from its request, so that the same command has
-the same name."""
+"""Pattern of the name of an adaptive sweep. The client computes the name from its request; the same command therefore
+has the same name again."""
 _MOST_BYTES = 256 << 10
-"""Largest size in bytes of a report: the largest number of points with three keys for each point (chosen value)."""
+"""Largest size in bytes of a report (chosen value): enough for the largest number of points with three keys each."""
 _MOST = 100
-"""Largest number of adaptive sweeps of a user: 25 MB of memory (chosen value). A new adaptive sweep replaces the oldest
-one; the runs of the replaced sweep stay."""
+"""Largest number of adaptive sweeps that are kept of a user: 25 MB of memory (chosen value). A further adaptive sweep
+replaces the oldest one, whose runs stay."""
 
 
 class Searches:
@@ -35,8 +35,8 @@ class Searches:
         self._plans, self._store, self._lock = plans, store, threading.Lock()
 
     def report(self, owner: str, name: str, body: bytes) -> Plan:
-        """Stores a report of an adaptive sweep. The first report with a new name creates the sweep. Raises ServiceError
-        if the report is refused.
+        """Stores a report of an adaptive sweep. The first report with a new name creates the sweep. Cancels an adaptive
+        sweep: its client command may submit no more runs.
         """
         if not _NAME.fullmatch(name):
             raise not_found(f"adaptive sweep {name[:40]!r}")

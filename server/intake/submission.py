@@ -1,5 +1,5 @@
-"""Submission: the steps from a request body to an accepted run. A case is read, checked, estimated and written to disk
-before the server acknowledges the run.
+"""Submission of a run: the steps from a request body to an accepted run. The case is read, checked, estimated and
+written to disk before the client gets its answer.
 """
 
 import hashlib
@@ -50,9 +50,9 @@ class Wishes:
     profile: str = ""
     """Profile of a batch system; empty: the profile in the case, or the default profile of the site."""
     priority: int = 0
-    """Priority of the run among the runs of its owner."""
+    """Priority of the run among the runs of the same owner."""
     restart: str = ""
-    """Id of a run of the same owner, from whose newest checkpoint the new run continues."""
+    """Id of a run of the same owner; the new run continues from its newest checkpoint."""
 
     @property
     def digest(self) -> str:
@@ -64,8 +64,8 @@ class Desk:
     """Accepts submissions. All methods of this class may be called from any thread."""
 
     def __init__(self, settings: Settings, store: Store, supervisor: Supervisor, sent: Uploads) -> None:
-        """Creates the submissions object. A server has only one such object, whose lock makes one run from two requests
-        with the same key; ``sent``: uploaded files.
+        """Creates the object. ``sent``: the uploaded files. A server has only one such object: its lock ensures that
+        two requests with the same idempotency key make only one run.
         """
         self._settings, self._store, self._supervisor, self._sent = settings, store, supervisor, sent
         self._reader, self._limits = the_reader(), limits.of(settings)
@@ -77,10 +77,11 @@ class Desk:
         self, body: bytes, content_type: str, source: Source, surveys: dict[bytes, bytes] | None = None,
         *, swept: bool = False,
     ) -> Reading:  # fmt: skip
-        """Reads the case in ``body``, and the files that the case names from ``source``. ``surveys``: content of mesh
-        files that were read before, by the bodies that are made of the files. ``swept``: the case is a point of a
-        sweep; without a number of threads it gets one, because simultaneous runs use the cores better than the threads
-        of one run. Raises CaseError with every problem of the case; raises ServiceError with status 415, 422 or 503.
+        """Reads the case in ``body``, and the files that the case names from ``source``. ``surveys``: surveys of mesh
+        files that were made before, by the bodies that are made from the files; new surveys are added. ``swept``:
+        whether the case is a point of a sweep. Without ``run.threads`` such a case gets one thread, because runs at the
+        same time use the cores better than threads do. Raises CaseError with every problem of the case; raises
+        ServiceError with status 415, 422 or 503.
         """
         kind = _file_name(content_type)
         most = structs.replace(self._limits, threads=1) if swept else self._limits
@@ -96,8 +97,8 @@ class Desk:
             raise WrongCaseError(error.problems, reading.files) from None
 
     def source(self, owner: str, restart: str = "") -> Source:
-        """Returns the source of the files that a case names: uploaded files, or the run from which the new run
-        continues.
+        """Returns the source of the files that a case names: the uploaded files, or the files of the run that the new
+        run continues.
         """
         return of_run(self._settings.runs / restart) if restart else of_owner(self._sent, owner)
 
@@ -105,10 +106,10 @@ class Desk:
         self, owner: str, body: bytes, content_type: str, key: str | None, wishes: Wishes | None = None,
         reading: Reading | None = None,
     ) -> dict[str, Any]:  # fmt: skip
-        """Accepts a run and returns its receipt; the same idempotency key and body give the same receipt.
+        """Accepts a run and returns its receipt. The same idempotency key with the same body gives the same receipt.
 
-        ``reading``: the case, if the case has been read already. Raises ServiceError if the run is refused. The case
-        and the first line of the journal are on disk when the method returns.
+        ``reading``: the case, if it has already been read. Raises ServiceError if the run is refused. The case and the
+        first line of the journal are on disk when the method returns.
         """
         if key is not None and not _KEY.fullmatch(key):
             raise ServiceError(
@@ -140,15 +141,15 @@ class Desk:
             )
 
     def check_room(self, owner: str, keys: Sequence[str]) -> None:
-        """Raises ServiceError with status 422, 429 or 507 if the owner may not submit the runs for those ``keys`` that
-        have no run yet.
+        """Raises ServiceError with status 422, 429 or 507 if the owner may not submit the runs for those ``keys`` for
+        which no run exists yet.
         """
         more = sum(self._store.run_of_key(owner, key) is None for key in keys)
         if more:
             self._check_room(owner, more)
 
     def check_output(self, owner: str) -> None:
-        """Raises ServiceError with status 429 if the runs of the owner have reached the limit of bytes."""
+        """Raises ServiceError with status 429 if the folders of the owner's runs have reached their largest size."""
         limits.check_output(self.kept(owner), self._settings.site.quota)
 
     def _check_room(self, owner: str, more: int = 1) -> None:
@@ -160,7 +161,7 @@ class Desk:
         return [run_id for key in keys if (run_id := self._store.run_of_key(owner, key)) is not None]
 
     def take_back(self, run_id: str) -> None:
-        """Cancels a run; logs an error instead of raising it."""
+        """Cancels a run whose submission is refused; an error is only logged."""
         try:
             self._supervisor.cancel(run_id)
         except Exception as error:
@@ -239,8 +240,8 @@ class Desk:
 
 
 def _surveyed(reading: Reading, place: Path, known: dict[bytes, bytes]) -> bytes:
-    """Returns the content of the mesh files of a case. A mesh file is read once for all cases that make the same bodies
-    from the file.
+    """Returns the survey of the mesh files of a case. The survey is made once for all cases that make the same bodies
+    from the files.
     """
     case = msgspec.json.decode(reading.case)
     bodies = msgspec.json.encode([(part["mesh"], part["turn"]) for part in case["parts"]])
@@ -267,7 +268,7 @@ def labels_of(texts: Sequence[str]) -> dict[str, str]:
 
 
 def receipt(made: Submission) -> dict[str, Any]:
-    """Returns the answer to a submission; the answer does not depend on the time of the request."""
+    """Returns the answer to a submission; it is the same for a repeated request."""
     return {
         "id": made.id, "owner": made.owner, "name": made.name, "title": made.title, "state": "accepted",
         "ranks": made.ranks, "threads": made.threads, "submitted": made.submitted, "estimate": made.estimate,

@@ -1,4 +1,4 @@
-"""Request for a sweep: the case, the points and the limit; makes the case of each point."""
+"""The request for a sweep (case, points, largest number of concurrent runs), and the case of each point."""
 
 import json
 from typing import Any
@@ -12,7 +12,9 @@ from ..errors import ServiceError, invalid_case
 
 
 class Wish(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Request for a sweep: a case as JSON, the changes of each point, and the largest number of concurrent runs."""
+    """Request for a sweep: a case as JSON, the changed values of each point, and the largest number of concurrent
+    runs.
+    """
 
     case: dict[str, Any]
     points: list[dict[str, Any]]
@@ -20,7 +22,7 @@ class Wish(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
 
 
 def wish_of(body: bytes) -> Wish:
-    """Reads the request for a sweep. Raises ServiceError if the request is invalid."""
+    """Reads the request for a sweep. Raises ServiceError if the request is not valid."""
     try:
         wish = msgspec.convert(json_data(body), Wish)
     except CaseError as error:
@@ -45,5 +47,5 @@ def changed(case: dict[str, Any], point: dict[str, Any], n: int) -> bytes:
 
 
 def at_point(n: int, error: CaseError) -> ServiceError:
-    """Returns the error at point ``n`` of the sweep."""
+    """Returns ``error`` with the number ``n`` of the point that caused it."""
     return invalid_case([Problem(each.key, each.value, f"{each.message} (point {n})") for each in error.problems])

@@ -1,10 +1,10 @@
-"""Sweeps: one case at many points; each point is a separate run. A sweep is one plain file,
+"""Sweeps: one case at several points; each point is a run with changed values. A sweep is one plain file,
 ``<runs>/sweeps/<id>.json``.
 
-The file of a sweep is written before the first run is made, and the idempotency key of each run contains the sweep id
-and the point number. Therefore a client can send an interrupted request again: the server completes the sweep, and
-makes no run twice. If a server was killed while it accepted a sweep, the next server completes the sweep, or removes a
-sweep without idempotency key. No run of a sweep starts before all runs of the sweep are accepted.
+The file of a sweep is written before the first run is made, and the idempotency key of each run consists of the id of
+the sweep and the number of the point. Therefore a client can repeat an interrupted request: the server completes the
+sweep and makes no run twice. If a server was killed while it accepted a sweep, the next server completes the sweep; it
+removes a sweep whose request had no idempotency key. The runs of a sweep start only after all of them are accepted.
 """
 
 import hashlib
@@ -30,10 +30,10 @@ from .sweep_request import Wish, at_point, changed, wish_of
 
 _log = logging.getLogger("conoid.server")
 _AGAIN = 2.0
-"""Time in s after which the server tries again to complete an incomplete sweep (chosen value)."""
+"""Time in s after which the server tries again to complete a sweep (chosen value)."""
 _MOST_BYTES = 16 << 20
-"""Largest number of values of all cases of a sweep; the values are computed in one second (reason of the chosen
-limit)."""
+"""Largest size in bytes of the cases of all points together; reading them takes one second (reason of the chosen
+value)."""
 _JSON = "application/json"
 _HASHES = re.compile(r"[0-9a-f]{64}")
 
@@ -45,15 +45,15 @@ class Sweeps:
         """Reads the stored sweeps."""
         self.plans, self._desk = Plans(settings), desk
         self._locks: dict[str, threading.Lock] = {}
-        """Locks by owner, so that a large sweep of one user does not delay other users."""
+        """Locks, one for each owner, so that a large sweep of one user does not delay other users."""
         self._filling: set[str] = set()
         self._cancelled: set[str] = set()
         self._left = [plan for plan in self.plans if not plan.whole]
         self._filling |= {plan.id for plan in self._left}
 
     def complete(self) -> None:
-        """Completes, in a thread, the incomplete sweeps of an earlier server. The runs of a sweep wait until the sweep
-        is complete.
+        """Completes the sweeps that an earlier server has accepted only in part, in a thread. The runs of such a sweep
+        wait until it is complete.
         """
         for plan in self._left:
             runs = plan.earlier or self._desk.runs_of(plan.owner, plan.keys)
@@ -70,9 +70,8 @@ class Sweeps:
                 time.sleep(_AGAIN)
 
     def _completed(self, plan: Plan) -> bool:
-        """Completes a sweep; returns False if the server must try again later. A stored sweep that cannot be completed
-        is removed. An incomplete sweep without an idempotency key is also removed, because the client got no answer and
-        will send a new sweep.
+        """Completes a sweep; returns False if the server must try again later. A sweep that cannot be completed is
+        removed. A sweep without idempotency key is also removed: its client got no answer and will send a new request.
         """
         with self._locks.setdefault(plan.owner, threading.Lock()):
             there = self.plans.get(plan.id)
@@ -95,13 +94,15 @@ class Sweeps:
             return True
 
     def cancel(self, plan: Plan) -> list[str]:
-        """Returns the existing runs of the sweep. During a submission no other run of the sweep can start."""
+        """Cancels the rest of the submission of a sweep, and returns the runs that exist. After the call no further run
+        of the sweep starts.
+        """
         if not plan.whole:
             self._cancelled.add(plan.id)
         return (self.plans.get(plan.id) or plan).runs
 
     def get(self, sweep_id: str, owner: str) -> Plan | None:
-        """Returns the sweep if the sweep belongs to the owner."""
+        """Returns a sweep of the owner; None if the owner has no such sweep."""
         plan = self.plans.get(sweep_id)
         return plan if plan is not None and plan.owner == owner else None
 
@@ -118,9 +119,8 @@ class Sweeps:
             return self._accepted(fresh)
 
     def again(self, plan: Plan, body: bytes, failed: Mapping[int, str]) -> Plan:
-        """Repeats points of a sweep with new runs. ``failed``: number and present run of each point to repeat;
-        ``body``: the request of the sweep. Raises ServiceError, and leaves the sweep unchanged, if the repetition is
-        refused.
+        """Repeats points of a sweep with new runs. ``failed``: the points to repeat, with their present runs; ``body``:
+        the request of the sweep. Raises ServiceError, and leaves the sweep unchanged, if the repetition is refused.
         """
         with self._locks.setdefault(plan.owner, threading.Lock()):
             plan = self.plans.get(plan.id) or plan
@@ -137,7 +137,7 @@ class Sweeps:
             return self._accepted(fresh)
 
     def _accepted(self, plan: Plan) -> Plan:
-        """Returns the sweep with its missing runs; either all missing runs are accepted, or none. Raises ServiceError
+        """Accepts the missing runs of a sweep, all or none, and returns the sweep with these runs. Raises ServiceError
         if the runs are refused.
         """
         cases = self._cases(plan)
@@ -153,12 +153,14 @@ class Sweeps:
             self._complete_later([plan])
             raise
         self._filling.discard(plan.id)
-        self._cancelled.discard(plan.id)  # all runs of the sweep exist now: a later cancel cancels the runs
+        self._cancelled.discard(
+            plan.id
+        )  # all runs of the sweep exist from here on, so that a later cancel cancels the runs
         return filled
 
     def held(self, need: Need, active: Iterable[Need]) -> str:
-        """Returns why a run waits: its sweep is incomplete, or the number ``active`` of running runs of the sweep has
-        reached the limit of the sweep. The label of the run contains the id of the sweep.
+        """Returns why a run of a sweep waits: the sweep is not complete, or its largest number of concurrent runs is
+        reached. ``active``: the runs that have cores. A label of the run contains the id of its sweep.
         """
         plan = self.get(need.sweep, need.owner)
         if plan is None:
@@ -171,9 +173,7 @@ class Sweeps:
         return f"{own} runs of the same sweep are running, the largest number at a time" if own >= plan.at_once else ""
 
     def needed(self) -> set[str]:
-        """Returns the hashes of files that sweeps need while the sweeps are being accepted, because future runs of the
-        sweeps may name the files.
-        """
+        """Returns the hashes of files that must not be removed because runs of unfinished submissions may name them."""
         plans = [plan for plan in self.plans if not plan.whole]
         return {
             word for plan in plans for word in _HASHES.findall(msgspec.json.encode([plan.case, plan.points]).decode())
@@ -187,7 +187,7 @@ class Sweeps:
         return found[0] if found else None
 
     def _cases(self, plan: Plan) -> dict[int, tuple[bytes, Reading]]:
-        """Returns the case of each point that gets a run. Raises ServiceError with the problems of the cases."""
+        """Returns the case of each point that needs a run. Raises ServiceError with the problems of the cases."""
         made = {n: changed(plan.case or {}, plan.points[n], n) for n in plan.wanted}
         if sum(map(len, made.values())) > _MOST_BYTES:
             raise ServiceError(413, "too_large", f"the cases have more than {size(_MOST_BYTES)} together")
@@ -221,8 +221,8 @@ class Sweeps:
         return plan
 
     def _take_back(self, plan: Plan) -> None:
-        """Cancels the runs of a refused sweep before any of the runs has started. If points of the sweep were repeated,
-        the earlier runs stay unchanged.
+        """Cancels the runs of a refused sweep; none of them has started yet. If points were repeated, their earlier
+        runs stay.
         """
         for run_id in self._desk.runs_of(plan.owner, [plan.keys[n] for n in plan.wanted]):
             self._desk.take_back(run_id)

@@ -1,13 +1,13 @@
-"""Uploaded files: plain files in ``<runs>/uploads/<owner>/``, each named by its sha256.
+"""Uploaded files: plain files in ``<runs>/uploads/<owner>/``, each named by its SHA-256 hash.
 
 ::
 
     <sha256>              complete: the content has this hash, and never changes
     <sha256>.<size>.part  incomplete: its length is the number of arrived bytes, of ``size``
 
-Each user has separate files, and every request names its user, so that no user can find out the uploads of other users.
-The folder of a run gets a hard link to each file (``give``); the link stays when the upload is removed. The access time
-of an uploaded file is set explicitly to the time of its last request.
+Each user has a folder, and every request reads only the folder of its user; so no user can find out what others have
+uploaded. The folder of a run gets a hard link to each file that its case names (``give``). The link stays when the
+uploaded file is removed. The access time of an uploaded file is set to the time of the last request for this file.
 """
 
 import os
@@ -30,14 +30,14 @@ from ..requests.limits import later
 FOLDER = "uploads"
 _PART = ".part"
 _SYNCED = 1 << 26
-"""Number of bytes after which arrived data is flushed to disk. A slow disk takes one second for this number of bytes,
-which is the longest delay of a write (chosen value)."""
+"""Number of bytes after which arrived data is flushed to disk (chosen value). A slow disk takes one second to flush
+them, which is the largest delay of a write."""
 
 
 @dataclass(frozen=True)
 class Upload:
-    """An uploaded file of a user: ``size`` bytes, of which ``offset`` bytes have arrived; ``asked``: Unix time of the
-    last request for the file, s.
+    """An uploaded file of a user. ``offset`` of its ``size`` bytes have arrived; ``asked``: Unix time of the last
+    request for the file, s.
     """
 
     sha256: str
@@ -48,8 +48,8 @@ class Upload:
 
 
 class Part:
-    """An incomplete uploaded file, open for writing. The file is closed only when all references to this object are
-    released, because a thread may write to a hanging disk after its request has ended.
+    """An incomplete uploaded file, open for writing. The file is closed when no reference to this object is left,
+    because a thread may still write to a hanging disk after its request was given up.
     """
 
     def __init__(self, path: Path, size: int, *, anew: bool) -> None:
@@ -87,20 +87,20 @@ class Part:
 
 
 class Uploads:
-    """Uploaded files of all users. All methods of this class may be called from any thread. No state is kept in memory:
-    the folder of uploads is read each time.
+    """Uploaded files of all users. All methods of this class may be called from any thread. Nothing is kept in memory:
+    every method reads the folder.
     """
 
     def __init__(self, runs: Path, rules: Files, free_disk: int) -> None:
-        """Creates the object without a folder. ``free_disk``: bytes of the disk that uploads may not use."""
+        """Creates the object. ``rules``: limits of the site; ``free_disk``: bytes of the disk that must stay free."""
         self._runs, self._folder, self._rules, self._free_disk = runs, runs / FOLDER, rules, free_disk
         self._locks: dict[str, threading.Lock] = {}
         self.left: Callable[[str], int | None] = lambda owner: None
-        """Function that returns the number of bytes that an owner may still upload; None: only the limit of ``rules``
-        applies."""
+        """Function that returns how many more bytes an owner may have on disk; None: no further limit than
+        ``rules``."""
 
     def _lock(self, owner: str) -> threading.Lock:
-        """Returns the lock of an owner; each owner has a separate lock, so that users do not wait for each other."""
+        """Returns the lock of an owner; users do not wait for each other."""
         return self._locks.setdefault(owner, threading.Lock())
 
     def of(self, owner: str) -> list[Upload]:
@@ -130,7 +130,7 @@ class Uploads:
         return [folder / sha256, *(p for p in folder.glob(f"{sha256}.*{_PART}") if _size_of(p.name) is not None)]
 
     def begin(self, owner: str, sha256: str, total: int, first: int | None = None) -> Part:
-        """Opens an incomplete file at the byte ``first``; creates a new file if ``first`` is None. From this call on,
+        """Opens the incomplete file at the byte ``first`` for writing; ``first`` None: begins a new file. From now on
         the whole size of the file counts as disk usage of its owner. Raises ServiceError with status 409, 413, 429 or
         507; raises OSError.
         """
@@ -174,7 +174,7 @@ class Uploads:
             raise ServiceError(507, "disk_full", detail, retryable=True)
 
     def finish(self, owner: str, part: Part) -> None:
-        """Renames a complete and verified file to its final name; flushes the file to disk before it returns.
+        """Gives a complete and verified file its final name, and flushes it to disk.
 
         Raises OSError.
         """
@@ -187,13 +187,15 @@ class Uploads:
             durable.sync_folder(whole.parent)
 
     def give(self, owner: str, sha256: str, target: Path) -> None:
-        """Makes a hard link to the uploaded file in the folder of a run. Raises FileNotFoundError, OSError."""
+        """Makes a hard link to an uploaded file at the path ``target`` in the folder of a run. Raises
+        FileNotFoundError, OSError.
+        """
         with self._lock(owner):
             give(self._folder / owner / sha256, target)
 
     def remove(self, owner: str, sha256: str) -> bool:
         """Removes an uploaded file, complete or incomplete; returns False if the file does not exist. Runs keep their
-        copies of the uploaded file. Raises OSError.
+        copies. Raises OSError.
         """
         with self._lock(owner):
             there = [path for path in self._paths(owner, sha256) if path.exists()]
@@ -202,21 +204,21 @@ class Uploads:
         return bool(there)
 
     def purge(self, now: float, needed: Container[str] = ()) -> list[str]:
-        """Removes files that no run uses and that were not requested lately, except the hashes in ``needed``;
-        returns a line for each removed file. A file that a run also uses stays, because it needs no additional
-        space. Raises OSError.
+        """Removes the files that no run uses and that no request has named for the time that the site allows, except
+        those in ``needed``. Returns a line of text for each. A file that a run also uses stays, because it takes no
+        additional space. Raises OSError.
         """
         gone: list[str] = []
         for owner in self.owners():
             hashes = [sent.sha256 for sent in self.of(owner) if sent.sha256 not in needed]
             gone += [f"file {sha256} of {owner}" for sha256 in hashes if self._dropped(owner, sha256, now)]
             with self._lock(owner), suppress(OSError):
-                (self._folder / owner).rmdir()  # fails if the folder is not empty
+                (self._folder / owner).rmdir()  # this fails if the folder is not empty
         return gone
 
     def _dropped(self, owner: str, sha256: str, now: float) -> bool:
-        """Removes the file if it is old; returns whether it has been removed. The lock of the owner prevents requests
-        for the file during the call.
+        """Removes the file if it is old enough. Returns whether it was removed. The lock of the owner prevents requests
+        for the file meanwhile.
         """
         with self._lock(owner):
             for path in self._paths(owner, sha256):
@@ -228,14 +230,16 @@ class Uploads:
         return True
 
     def owners(self) -> list[str]:
-        """Returns the users with uploads. Raises OSError."""
+        """Returns the users who have uploaded files. Raises OSError."""
         try:
             return sorted(entry.name for entry in os.scandir(self._folder) if entry.is_dir(follow_symlinks=False))
         except FileNotFoundError:
             return []
 
     def weigh(self, owner: str) -> dict[tuple[int, int], int]:
-        """Returns the bytes of each file of an owner by device and inode; a run with a link has the same inode."""
+        """Returns the size in bytes of each file of an owner, by device and inode; a hard link in a run's folder has
+        the same inode.
+        """
         found: dict[tuple[int, int], int] = {}
         with suppress(FileNotFoundError), os.scandir(self._folder / owner) as entries:
             for entry in entries:
@@ -252,8 +256,8 @@ def _wrong_offset(there: int, first: int | None) -> ServiceError:
 
 
 def give(source: Path, target: Path) -> None:
-    """Links a file that never changes, or copies the file if the file system has no links. The file and its folder are
-    flushed to disk before the function returns. Raises FileNotFoundError, OSError.
+    """Makes a hard link to a file that never changes; copies the file if the file system has no hard links. The file
+    and its folder are flushed to disk before the function returns. Raises FileNotFoundError, OSError.
     """
     try:
         os.link(source, target, follow_symlinks=False)
@@ -264,12 +268,12 @@ def give(source: Path, target: Path) -> None:
 
 
 def _want(path: Path, status: os.stat_result) -> None:
-    """Sets the time of the last request of a file to now."""
+    """Sets the time of the last request for a file to now."""
     os.utime(path, ns=(time.time_ns(), status.st_mtime_ns), follow_symlinks=False)
 
 
 def _sent(entry: "os.DirEntry[str]") -> Upload | None:
-    """Returns the upload of a path; None for other files and for a file that has been removed."""
+    """Returns the upload that a folder entry contains; None for other files, and for a file that was just removed."""
     with suppress(FileNotFoundError):
         return _upload_of(entry.name, entry.stat(follow_symlinks=False))
     return None

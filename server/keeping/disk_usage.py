@@ -1,6 +1,6 @@
 """Disk usage of runs and uploaded files.
 
-A file that several cases name is one file on disk; the file counts once for each user.
+If several cases of a user name the same file, it is one file on disk and counts once.
 """
 
 import os
@@ -13,12 +13,12 @@ from pathlib import Path
 from conoid.cases.output import layout
 
 Copies = dict[tuple[int, int], int]
-"""Size of files in bytes, by device and inode."""
+"""Sizes of files in bytes, by device and inode."""
 
 
 def size(folder: Path) -> int:
-    """Returns the size of all files of a run in bytes, without the copies of files that the case names. A file that
-    disappears during the call counts as 0 bytes.
+    """Returns the size of all files in the folder of a run, bytes, without the copies of files that its case names. A
+    file that disappears during the call counts as 0 bytes.
     """
     total = 0
     for place, folders, names in os.walk(folder):
@@ -31,8 +31,8 @@ def size(folder: Path) -> int:
 
 
 def copies(folder: Path) -> Copies:
-    """Returns the size in bytes of each file that the case names, by device and inode, because several runs may share a
-    file.
+    """Returns the sizes of the copies of files that the case of a run names, by device and inode, because several runs
+    may share a file.
     """
     found: Copies = {}
     with suppress(FileNotFoundError, NotADirectoryError), os.scandir(folder / layout.FILES) as entries:
@@ -45,8 +45,8 @@ def copies(folder: Path) -> Copies:
 
 @dataclass
 class DiskUsage:
-    """Sizes of folders and files, measured at the last pass. The methods of this class must be called by one thread at
-    a time.
+    """Sizes of the folders of runs and of uploaded files, as they were last measured. The methods of this class must be
+    called by one thread at a time.
     """
 
     sizes: dict[str, int] = field(default_factory=dict)
@@ -59,23 +59,25 @@ class DiskUsage:
     """Uploaded files of each user, by device and inode."""
 
     def note(self, run: str, owner: str, its: int, copies: Copies) -> None:
-        """Records the size of a run's folder and the files that its case names."""
+        """Stores the size of a run's folder, and the files that its case names."""
         self.sizes[run], self.files[run], self.owners[run] = its, copies, owner
 
     def keep(self, there: Set[str], sent: dict[str, Copies]) -> None:
-        """Drops runs whose folder is missing, and records the uploaded files."""
+        """Forgets the runs whose folder is not in ``there``, and stores the uploaded files."""
         for run in self.sizes.keys() - there:
             self.drop(run)
         self.sent = sent
 
     def drop(self, run: str) -> None:
-        """Drops a run whose folder has been removed."""
+        """Forgets a run whose folder was removed."""
         self.sizes.pop(run, None)
         self.files.pop(run, None)
         self.owners.pop(run, None)
 
     def by_owner(self) -> Counter[str]:
-        """Returns the bytes of each user: folders of runs and uploaded files; each file counts once."""
+        """Returns the number of bytes of each user: folders of runs, copies of files, and uploaded files; each file
+        counts once.
+        """
         found, files = Counter[str](), {owner: dict(copies) for owner, copies in self.sent.items()}
         for run, owner in self.owners.items():
             found[owner] += self.sizes[run]
@@ -84,10 +86,10 @@ class DiskUsage:
 
 
 class Left:
-    """Number of bytes that remain while runs are removed one after the other."""
+    """Number of bytes that remain on disk while runs are removed one after the other."""
 
     def __init__(self, weights: DiskUsage) -> None:
-        """Begins with ``total``, the bytes of all runs."""
+        """Starts with the sum over all runs in ``total``."""
         self._sizes, self._files = dict(weights.sizes), dict(weights.files)
         held = [*self._files.values(), *weights.sent.values()]
         self._names = Counter(inode for copies in held for inode in copies)
@@ -95,7 +97,7 @@ class Left:
         self.total = sum(self._sizes.values()) + sum(files.values())
 
     def drop(self, run: str) -> None:
-        """Subtracts a run, and the files of the run that no other run and no user has."""
+        """Subtracts a run, with those files that no other run and no user has."""
         self.total -= self._sizes.pop(run, 0)
         for inode, size in self._files.pop(run, {}).items():
             self._names[inode] -= 1

@@ -1,4 +1,4 @@
-"""Removal of the folders of runs and of uploaded files, by age and size."""
+"""Removal of the folders of runs and of uploaded files, by their age and by their size."""
 
 import logging
 import threading
@@ -24,19 +24,19 @@ from .removed_runs import RemovedRuns
 
 _log = logging.getLogger("conoid.server")
 _PATIENCE = 5.0
-"""Time in s from the start of the server to the first pass over the folders (chosen value). Requests may cause further
-passes; the time between two passes is at least this time."""
+"""Time in s between the start of the server and the first check of the folders (chosen value). ``_PATIENCE`` is also
+the smallest time between two checks."""
 
 
 class Removal:
-    """Measures and removes folders in a separate thread. All methods of this class may be called from any thread.
+    """Measures and removes folders in a thread of its own. All methods of this class may be called from any thread.
     Folders are measured only if the site has the table [retention] or the key quota.output_bytes.
     """
 
     def __init__(
         self, settings: Settings, store: Store, lines: RemovedRuns, is_open: Callable[[str], bool], sent: Uploads
     ) -> None:
-        """Creates the object without starting its thread. ``is_open``: function that returns whether a run may still
+        """Creates the object; ``start`` starts its thread. ``is_open``: function that returns whether a run may still
         change.
         """
         self._settings, self._store, self._lines, self._is_open, self._sent = settings, store, lines, is_open, sent
@@ -44,12 +44,12 @@ class Removal:
         asked = self._rules.oldest is not None or self._rules.bytes is not None
         self._weighs = asked or settings.site.quota.output_bytes is not None
         self.needed: Callable[[], Set[str]] = frozenset
-        """Function that returns the hashes of uploaded files that must not be removed now."""
+        """Function that returns the hashes of uploaded files that must not be removed at present."""
         self._lock, self._asking = threading.Lock(), threading.Lock()
         self._asked_again = 0.0
         self._usage = DiskUsage()
         self._settled: set[str] = set()
-        """Runs that have ended and whose final size was measured."""
+        """Runs that have ended and whose final size is known."""
         self._kept: Counter[str] = Counter()
         self._leave = threading.Event()
         self._thread = threading.Thread(target=self._work, name="removal", daemon=True)
@@ -65,12 +65,13 @@ class Removal:
             self._thread.join(_PATIENCE)
 
     def kept(self, owner: str) -> int:
-        """Returns the bytes of an owner's runs and uploaded files at the last pass."""
+        """Returns the number of bytes of an owner's runs and uploaded files when they were last measured."""
         return self._kept[owner]
 
     def kept_now(self, owner: str) -> int:
-        """Returns the bytes of an owner's runs and uploaded files. If the site has no limit of size, the thread
-        measures nothing; this method then measures the folders, at most every ``_PATIENCE`` s. Raises SQLAlchemyError.
+        """Returns the bytes of an owner's runs and uploaded files. If the settings of the site do not need sizes, the
+        thread does not measure them; this method then measures them itself, at most every ``_PATIENCE`` s. Raises
+        SQLAlchemyError.
         """
         with self._asking:
             if not self._weighs and time.monotonic() >= self._asked_again:
@@ -80,8 +81,8 @@ class Removal:
         return self._kept[owner]
 
     def remove(self, run: Run, why: str) -> None:
-        """Removes the folder of a run that has ended, after the record of the run is on disk. Raises OSError if the
-        folder cannot be removed.
+        """Removes the folder of a run that has ended; before, it writes the record of the run to disk. Raises OSError
+        if the folder cannot be removed.
         """
         path = self._settings.runs / run.id
         if not path.is_dir():
@@ -93,8 +94,8 @@ class Removal:
             self._kept = self._usage.by_owner()
 
     def look(self) -> None:
-        """Checks all uploaded files and all folders of runs once, and removes those that the rules of the site allow to
-        remove. Raises OSError or SQLAlchemyError.
+        """Checks all folders of runs and all uploaded files once, and removes those that the rules of the site select.
+        Raises OSError or SQLAlchemyError.
         """
         for line in self._sent.purge(time.time(), self.needed()):
             _log.info("%s is removed: no run uses it, and it was not requested lately", line)
@@ -103,17 +104,17 @@ class Removal:
         paths, known = self._all()
         self._weigh(paths, known)
         for run, why in self._due([known[path.name] for path in paths], time.time()):
-            with suppress(FileNotFoundError):  # the owner may have removed the run at the same time
+            with suppress(FileNotFoundError):  # the owner may be removing the run at the same time
                 self.remove(run, why)
                 _log.info("run %s of %s is removed: %s", run.id, run.owner, why)
 
     def _all(self) -> tuple[list[Path], dict[str, Run]]:
-        """Returns the folders of all runs in the database, and the runs of the folders by id."""
+        """Returns the folders of all runs in the database, and the runs by id."""
         known = {run.id: run for run in self._store.all()}
         return [path for path in folder.runs_in(self._settings.runs) if path.name in known], known
 
     def _weigh(self, paths: list[Path], known: dict[str, Run]) -> None:
-        """Measures the folders that may have changed since the last pass, and the uploaded files."""
+        """Measures the folders that may have changed since the last time, and the uploaded files."""
         for path in paths:
             if path.name not in self._settled:
                 weighed = size(path), copies(path)
@@ -129,7 +130,7 @@ class Removal:
             self._kept = self._usage.by_owner()
 
     def _due(self, runs: list[Run], now: float) -> Iterator[tuple[Run, str]]:
-        """Yields the runs to remove, oldest first, each with the rule of the site that removes the run."""
+        """Yields the runs to be removed, oldest first, each with the rule that selects it."""
         left, most, oldest = Left(self._usage), self._rules.bytes, self._rules.oldest
         for run in sorted(runs, key=lambda run: run.finished):
             old = oldest is not None and now - run.finished > oldest
@@ -154,9 +155,7 @@ class Removal:
 
 
 def restore(store: Store, lines: RemovedRuns) -> None:
-    """Marks removed runs as removed in a new database, which replaces a lost database. Raises SQLAlchemyError or
-    OSError.
-    """
+    """Marks removed runs as removed in a new database that replaces a lost one. Raises SQLAlchemyError or OSError."""
     ended = store.ended()
     for run_id in lines:
         line = lines.get(run_id)

@@ -1,4 +1,4 @@
-"""File purged.jsonl: one line with the outcome of each run whose folder has been removed."""
+"""The file purged.jsonl: it has one line for each run whose folder was removed, with the outcome of the run."""
 
 import io
 import os
@@ -24,7 +24,7 @@ FILE = "purged.jsonl"
 
 
 class RemovedRun(msgspec.Struct, kw_only=True, frozen=True):
-    """The stored record of a removed run. All times of the record are Unix times in s."""
+    """The record of a removed run. Times are Unix times in s."""
 
     id: str
     owner: str
@@ -38,9 +38,9 @@ class RemovedRun(msgspec.Struct, kw_only=True, frozen=True):
     message: str
     removed: float
     why: str
-    """User that removed the run, or rule of the site that removed it."""
+    """The user or the rule of the site by which the run was removed."""
     steps: int | None = None
-    """Number of the last step, and simulated time reached, s; None if unknown."""
+    """Number of the last step; None if unknown."""
     time: float | None = None
     digest: str = ""
     bytes: int = 0
@@ -74,8 +74,8 @@ def of(run: Run, path: Path, why: str) -> RemovedRun:
 
 
 class RemovedRuns:
-    """The records of all removed runs. All methods of this class may be called from any thread. Memory contains only
-    the offset of each line of purged.jsonl.
+    """The records of all removed runs. All methods of this class may be called from any thread. In memory it has only
+    the position of each line in the file.
     """
 
     def __init__(self, runs: Path) -> None:
@@ -98,8 +98,8 @@ class RemovedRuns:
         return iter(tuple(self._at))
 
     def add(self, line: RemovedRun) -> None:
-        """Appends a record; flushes the record to disk before it returns. A second record of the same run replaces the
-        first record. Raises OSError if the record cannot be written.
+        """Appends a record; flushes the record to disk before it returns. A second record of a run replaces the first
+        one. Raises OSError if the record cannot be written.
         """
         with self._lock, whole.appended(self._path, 0o600) as file:
             end = os.fstat(file.fileno()).st_size
@@ -114,9 +114,7 @@ class RemovedRuns:
         durable.sync_folder(self._path.parent)
 
     def get(self, run_id: str) -> RemovedRun | None:
-        """Returns the record of a removed run; None if the run has no record. Raises OSError if the file cannot be
-        read.
-        """
+        """Returns the record of a removed run; None if there is none. Raises OSError if the file cannot be read."""
         place = self._at.get(run_id)
         if place is None:
             return None

@@ -14,7 +14,9 @@ class Taker(Protocol):
     """A run whose job has ended."""
 
     def took(self, found: dict[str, str]) -> None:
-        """Stores the answer of the accounting database. Raises OSError if the answer cannot be stored."""
+        """Stores the usage of the job, as the accounting database has reported it. Raises OSError if the answer cannot
+        be stored.
+        """
 
 
 class Accounting:
@@ -30,7 +32,7 @@ class Accounting:
         self._lock = threading.Lock()
 
     def note(self, run: Taker, job: str) -> None:
-        """Sends the queries one after the other, and stores the answers of the accounting database."""
+        """Adds a query about the job of a run; the thread stores the answer in the run."""
         self._waiting.put((run, job))
         with self._lock:
             if not self._thread.is_alive():

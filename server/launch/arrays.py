@@ -1,7 +1,8 @@
-"""Runs of a sweep that start together are one job array of Slurm: one sbatch command, one task for each run.
+"""Runs of a sweep that are submitted together are one job array of Slurm: one sbatch command with one task for each
+run.
 
-The record of each run gets the name of the job array and its index before sbatch is called. After a crash the server
-reads the tasks of job arrays from the records, and submits the tasks that Slurm does not have again.
+Before sbatch is called, the record of each run gets the name of the job array and the index of its task. After a crash
+the server reads these records, and submits the tasks that Slurm does not have.
 """
 
 import logging
@@ -21,8 +22,8 @@ from .slurm_run import SlurmWorker
 
 _log = logging.getLogger("conoid.server")
 _SETTLES = 0.5
-"""Time in s without a new run after which a group of runs is submitted; the runs of a sweep are written some
-milliseconds apart (reason of the chosen value)."""
+"""Time in s without a new run after which a group of runs is submitted; the runs of a sweep are made some milliseconds
+apart (reason of the chosen value)."""
 _MOST = 1000
 """Largest number of tasks of a job array. The default of Slurm's MaxArraySize is 1001 (slurm.conf(5))."""
 
@@ -35,8 +36,8 @@ class Arrays:
         self._place, self._site = runs / layout.ARRAYS, site
 
     def hand_over(self, workers: Iterable[SlurmWorker]) -> set[str]:
-        """Submits groups that are complete; returns the names of runs that wait for their group. Raises AwayError or
-        OSError.
+        """Submits the groups that are complete. Returns the names of the runs that still wait for their group. Raises
+        AwayError or OSError.
         """
         fresh: dict[tuple[object, ...], list[SlurmWorker]] = {}
         known: dict[str, list[SlurmWorker]] = {}
@@ -56,7 +57,7 @@ class Arrays:
         return growing
 
     def _join(self, members: Sequence[SlurmWorker]) -> str:
-        """Writes the record of the job array, then the name of the array into the record of each run."""
+        """Writes the record of a job array, and its name into the record of each of its runs."""
         word = "".join(letter if letter.isalnum() else "_" for letter in members[0].group)[:60]
         name = f"conoid-{word}-{secrets.token_hex(4)}"
         folder = self._place / name

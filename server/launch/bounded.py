@@ -1,4 +1,4 @@
-"""Runs another program of Conoid in a process with limits. A thread of the server waits for the program."""
+"""Runs another program of Conoid in a process with limits; a thread of the server waits for the program."""
 
 import os
 import signal
@@ -22,8 +22,8 @@ _SECRET = ("CONOID_DATABASE", "CONOID_TOKEN")
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
-    """Limits of a program. Limits of each process: CPU time in s, memory in bytes, size of a file in bytes; limit of
-    all processes together: wall time in s.
+    """Limits of a program. CPU time in s, memory in bytes and size of a written file in bytes limit each process; the
+    wall time in s limits all processes together.
     """
 
     cpu: int
@@ -34,7 +34,7 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Ended:
-    """Output and exit code of a program that has ended. A negative exit code is minus the number of the signal that
+    """Output and exit code of a program that has ended. A negative exit code means that the signal with this number
     ended the program.
     """
 
@@ -45,7 +45,7 @@ class Ended:
 
     @property
     def why(self) -> str:
-        """Last line of the standard error output."""
+        """The last line of the standard error output, as the reason of a failure."""
         return next(iter(self.errors.strip().splitlines()[-1:]), f"code {self.code}")
 
 
@@ -54,8 +54,8 @@ def run(
     **more: str,
 ) -> Ended:  # fmt: skip
     """Runs the module ``program`` in ``folder``. ``question``: bytes for the standard input of the program; ``more``:
-    variables that are added to the environment of the program. The function blocks until the program, and every process
-    that shares its standard output, has ended.
+    additional environment variables of the program. The function returns when the program has ended, and every process
+    that shares its standard output.
     """
     limits = [str(most) for most in (bounds.memory, bounds.cpu, bounds.file)]
     env = {name: value for name, value in os.environ.items() if name not in _SECRET} | more

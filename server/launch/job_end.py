@@ -1,4 +1,4 @@
-"""The end of a Slurm job, from the record of the job, the run's folder, and the job list of Slurm."""
+"""The end of a Slurm job, from its record, from the run's folder, and from the list of jobs of Slurm."""
 
 from pathlib import Path
 
@@ -21,16 +21,14 @@ _READINGS: dict[str, Reading] = {
 
 
 def exit_of(folder: Path, job: Job, entry: Entry) -> Exit:
-    """Returns the end of the job ``entry`` of the run in ``folder``. ``job``: record of the job with the accounting
+    """Returns how the job ``entry`` of the run in ``folder`` ended. ``job``: record of the job with the accounting
     data.
     """
     return Exit(_code(job), False, _last_words(folder, job), _reading(entry))
 
 
 def _code(job: Job) -> int | None:
-    """Returns the exit code of the job script, or minus the number of the signal that ended the script; None if
-    unknown.
-    """
+    """Returns the exit code of the job script, or minus the number of the signal that ended it; None if unknown."""
     code, _, number = job.accounting.get("ExitCode", "").partition(":")
     if not code.isdigit() or not number.isdigit():
         return None
@@ -38,8 +36,8 @@ def _code(job: Job) -> int | None:
 
 
 def _last_words(folder: Path, job: Job) -> str:
-    """Returns the exit code of the ranks. For a task of a job array that ended before its ranks started, returns the
-    exit code of the job script.
+    """Returns the last line of the log of the ranks. For a task of a job array whose ranks have written no log, returns
+    the last line of the log of the task.
     """
     own = launcher_log.last_words(folder)
     if own or not job.array:

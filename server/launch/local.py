@@ -1,4 +1,6 @@
-"""Workers on this machine: runs ``mpiexec`` in a separate session, so that workers continue after the server ends."""
+"""Workers on this machine. The launcher runs ``mpiexec`` in a session of its own, so that workers continue after the
+server has ended.
+"""
 
 import os
 import shutil
@@ -24,16 +26,16 @@ from . import DamagedError, Exit, Job, LaunchError, Phase, Trace, Worker, memory
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
 _CROWDED = 4
-"""Number of ranks per core at and above which waiting ranks of MPICH sleep instead of polling."""
+"""Number of ranks per core from which on waiting ranks of MPICH sleep and do not poll."""
 _KILL_WAIT = 1.0
-"""Time in s to wait for the end of a killed launcher, so that no zombie process stays (chosen value; the end takes
-milliseconds)."""
+"""Time in s to wait for the end of a launcher that was killed, so that no zombie process stays (chosen value; it ends
+within milliseconds)."""
 _FRESH = 1.0
-"""Time in s for which a list of all processes is used again (chosen value). The list of processes is used for workers
-that an ended server started."""
+"""Time in s for which a list of all processes is used before it is read again (chosen value). The list is needed for
+workers that an earlier server has started."""
 _HOUR = 3600.0
-"""Age in s at which shared memory that no process has mapped is removed (chosen value). A new run maps its shared
-memory much sooner than at this age."""
+"""Age in s of shared memory that no process uses, after which it is removed (chosen value). A new run uses its shared
+memory long before."""
 
 
 class LocalLauncher:
@@ -49,8 +51,8 @@ class LocalLauncher:
         self._kills = memory.Kills()
 
     def start(self, job: Job) -> Worker:
-        """Starts the ranks, whose terminal output goes to log/launcher.log. Raises LaunchError if the ranks cannot be
-        started.
+        """Starts the ranks. The terminal output of the ranks is written to log/launcher.log. Raises LaunchError if the
+        ranks cannot be started.
         """
         bound = [] if self._mpiexec else binding(job.ranks, job.threads, core_numbers())
         argv = [*find_mpiexec(self._mpiexec), *bound, "-n", str(job.ranks), *self._worker, *_arguments(job)]
@@ -71,8 +73,8 @@ class LocalLauncher:
         return worker
 
     def find(self, run: str, folder: Path) -> Trace:
-        """Finds the worker by its record, or by the environment of its processes if a server was killed before it wrote
-        the record.
+        """Finds the worker of a run by its record in the run's folder. If a server was killed before it wrote the
+        record, finds it by the environment of its processes.
         """
         process = run_folder.process(folder)
         if process is None:
@@ -87,15 +89,15 @@ class LocalLauncher:
         return Trace(worker if not rebooted and worker.alive() else None, True, rebooted)
 
     def _members(self, run: str) -> set[int]:
-        """Returns the processes of a run. All runs use one list of all processes, so that a thousand runs cause one
-        reading of /proc.
+        """Returns the process numbers of a run. All runs use the same list of processes, so that a thousand runs read
+        /proc only once.
         """
         if time.monotonic() > self._looked + _FRESH:
             self._living, self._looked = processes.of_all_runs(), time.monotonic()
         return self._living.get(run, set())
 
     def tidy(self) -> None:
-        """Removes shared memory of MPICH, 2 MB for each run, that killed ranks have left."""
+        """Removes shared memory of MPICH that killed ranks have left, 2 MB for each run."""
         for path in processes.unused_shared_memory(Path("/dev/shm"), "mpich_shm_", _HOUR):
             path.unlink(missing_ok=True)
 
@@ -110,8 +112,8 @@ def _log_of(folder: Path) -> BinaryIO:
 
 
 def find_mpiexec(chosen: str) -> tuple[str, ...]:
-    """Returns the launcher of the site, else the launcher beside this Python, else the launcher in PATH. Raises
-    LaunchError if no launcher is found.
+    """Returns the command of mpiexec: that of the site; else that beside this Python; else that in PATH. Raises
+    LaunchError if there is none.
     """
     if chosen:
         return command(chosen, "--mpiexec")
@@ -123,8 +125,8 @@ def find_mpiexec(chosen: str) -> tuple[str, ...]:
 
 
 def binding(ranks: int, threads: int, cores: Sequence[int]) -> list[str]:
-    """Returns the options of MPICH's mpiexec that bind each rank to separate cores. The options are empty if the run
-    does not use all ``cores``, because other runs may use the remaining cores.
+    """Returns the options of MPICH's mpiexec that bind each rank to its own cores. If the run does not use all
+    ``cores``, there are no such options, because other runs may use any of the cores.
     """
     if ranks == 1 or threads == 1 or ranks * threads != len(cores):
         return []
@@ -133,8 +135,8 @@ def binding(ranks: int, threads: int, cores: Sequence[int]) -> list[str]:
 
 
 def environment(base: Mapping[str, str], job: Job) -> dict[str, str]:
-    """Returns the environment of a worker: libraries with one thread, the id of the run, and Zenoh credentials.
-    Variables of the server itself are removed from the environment of a worker.
+    """Returns the environment variables of a worker: one thread for the libraries, the id of the run, and the
+    credentials for Zenoh. Variables for the server itself are not among them.
     """
     env = {name: value for name, value in base.items() if name not in _NOT_FOR_WORKERS}
     env.update(dict.fromkeys(_ONE_THREAD, "1"))
@@ -170,7 +172,7 @@ class LocalWorker:
         self, run: str, folder: Path, process: Process, kills: memory.Kills,
         child: subprocess.Popen[bytes] | None = None,
     ) -> None:  # fmt: skip
-        """Creates the worker. ``child``: the process object if this server is the parent process."""
+        """Creates the worker. ``child``: the process object, if this server has started the worker."""
         self._run, self._folder, self._kills, self._child = run, folder, kills, child
         self.process = process
 
@@ -181,7 +183,7 @@ class LocalWorker:
         return processes.start_time(self.process.pid) == self.process.started
 
     def phase(self) -> Phase:
-        """Always True: a local run has its cores from the start."""
+        """Always ``runs``: a local run has its cores from the start."""
         return "runs"
 
     def began(self) -> float:
@@ -194,7 +196,7 @@ class LocalWorker:
 
     def exited(self) -> Exit | None:
         """Returns the end of the worker; None while ``mpiexec`` runs. Ranks that still run after the end of ``mpiexec``
-        are killed, so that no process writes into the run's folder any more.
+        are killed, so that no process writes into the run's folder afterwards.
         """
         self._kills.count()
         if self.alive() or processes.end_run(self._run):

@@ -1,8 +1,8 @@
-"""Detects processes that the kernel has killed for lack of memory.
+"""Finds out whether the kernel has killed a process because memory was short.
 
-The kernel counts the processes that it killed, for the machine and for each control group, and writes their process
-numbers into its log. A service may not be allowed to read the log of the kernel. The end of a run is reported as lack
-of memory only if the counts or the log of the kernel prove it.
+The kernel counts such processes, for the machine and for each control group, and writes their process numbers into its
+log. A service may not be allowed to read the log of the kernel. Therefore a lack of memory is reported only if the
+counts or the log prove it.
 """
 
 import ctypes
@@ -13,19 +13,19 @@ from pathlib import Path
 
 _PROC, _CGROUPS = Path("/proc"), Path("/sys/fs/cgroup")
 _READ_ALL, _LOG = 3, 1 << 20
-"""Arguments of klogctl(3): command, and number of bytes that are read at the end of the kernel's log."""
+"""Arguments of klogctl(3): the command, and the number of bytes to read from the end of the kernel's log."""
 _KILLED = re.compile(rb"Killed process (\d+) \(")
 _PAUSE, _RECENT = 0.25, 3.0
-"""Time in s between two counts of killed processes. A count must have grown within this time before the end of the
-ranks; Hydra ends the other ranks within a second (reason of the chosen value)."""
+"""Time in s between two readings of the count, and time in s before the end of the ranks within which the count must
+have increased. Hydra ends the other ranks within a second (reason of the chosen value)."""
 _FIRST_NAMESPACE = "pid:[4026531836]"
-"""Inode of the initial namespace of process numbers. The process numbers in the kernel's log are valid in the initial
-namespace (linux/proc_ns.h, PROC_PID_INIT_INO)."""
+"""Name of the initial namespace of process numbers. The process numbers in the kernel's log belong to this namespace
+(linux/proc_ns.h, PROC_PID_INIT_INO)."""
 
 
 def kills() -> int:
-    """Returns the number of processes that the kernel has killed for lack of memory. The number is that of this control
-    group if the kernel counts processes by group, else that of the machine.
+    """Returns the number of processes that the kernel has killed because memory was short. The number is that of this
+    control group if the kernel counts by control group, otherwise that of the machine.
     """
     own = _of_the_group()
     return own if own is not None else _count(_PROC / "vmstat") or 0
@@ -54,14 +54,16 @@ def _count(path: Path) -> int | None:
 
 
 class Kills:
-    """Detects workers that were killed for lack of memory. The class is used only in the supervisor's thread."""
+    """Finds out which workers the kernel has killed because memory was short. The class is used only in the
+    supervisor's thread.
+    """
 
     def __init__(self) -> None:
-        """Makes the first count of killed processes."""
+        """Creates the object and reads the count."""
         self._counts: deque[tuple[float, int]] = deque([(time.monotonic(), kills())])
 
     def count(self) -> None:
-        """Makes a new count of killed processes; called repeatedly while workers run."""
+        """Reads the count of killed processes; call it repeatedly while workers run."""
         now = time.monotonic()
         if now < self._counts[-1][0] + _PAUSE:
             return
@@ -70,8 +72,8 @@ class Kills:
             self._counts.popleft()
 
     def ended(self, pid: int | None) -> bool:
-        """Whether the kernel has just killed process ``pid`` for lack of memory, by the kernel's log. If the log cannot
-        be read, the change of the count of killed processes decides.
+        """Whether the kernel has just killed process ``pid`` because memory was short. The kernel's log decides; if it
+        cannot be read, an increase of the count decides.
         """
         if kills() == self._counts[0][1]:
             return False
@@ -80,8 +82,8 @@ class Kills:
 
 
 def logged() -> set[int] | None:
-    """Returns the process numbers in the kernel's log; None if the log cannot be read, or if this process has another
-    namespace of process numbers.
+    """Returns the process numbers of killed processes in the kernel's log; None if the log cannot be read, or if this
+    process is in another namespace of process numbers.
     """
     room = ctypes.create_string_buffer(_LOG)
     size = ctypes.CDLL(None).klogctl(_READ_ALL, room, _LOG)

@@ -1,4 +1,4 @@
-"""Processes in /proc of Linux: which processes exist, and to which run each process belongs."""
+"""The processes in /proc of Linux: which of them exist, and to which run each belongs."""
 
 import os
 import signal
@@ -8,12 +8,12 @@ from contextlib import suppress
 from pathlib import Path
 
 RUN_VARIABLE = "CONOID_RUN"
-"""Environment variable of every process of a run, including the processes that a rank starts. MPI launchers start ranks
-in separate sessions, so a process group does not contain all processes of a run."""
+"""Environment variable that every process of a run has, including those that a rank starts. A process group would not
+contain all processes of a run, because MPI launchers start ranks in sessions of their own."""
 
 _PROC = Path("/proc")
 _AFTER_NAME_STATE, _AFTER_NAME_PARENT, _AFTER_NAME_START = 0, 1, 19
-"""Positions of state, parent and start time among the fields of /proc/PID/stat after the name (proc(5))."""
+"""Positions of state, parent and start time among the fields of /proc/PID/stat that follow the name (proc(5))."""
 
 
 def boot() -> str:
@@ -56,7 +56,9 @@ def of_run(run: str) -> list[int]:
 
 
 def leader_of(members: Collection[int]) -> int | None:
-    """Returns the first process of a run, which the server started: its parent does not belong to the run."""
+    """Returns the first process of a run, the one that the server has started: its parent does not belong to the
+    run.
+    """
     return next((pid for pid in sorted(members) if parent(pid) not in members), None)
 
 
@@ -83,7 +85,9 @@ def end_run(run: str) -> int:
 
 
 def unused_shared_memory(folder: Path, prefix: str, age: float) -> list[Path]:
-    """Returns the files of this user in ``folder`` that are older than ``age`` s and are mapped by no process."""
+    """Returns the files of this user in ``folder`` that are older than ``age``, s, and that no process has mapped into
+    its memory.
+    """
     old = time.time() - age
     found = {}
     for path in folder.glob(f"{prefix}*"):

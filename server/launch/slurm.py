@@ -1,5 +1,5 @@
-"""Workers as jobs of Slurm. The commands of Slurm run in a separate thread, so that a Slurm controller that does not
-answer blocks nothing else.
+"""Workers as jobs of Slurm. The commands of Slurm run in a thread of the launcher, so that only this thread waits if
+the controller of Slurm does not answer.
 """
 
 import logging
@@ -28,8 +28,8 @@ _log = logging.getLogger("conoid.server")
 
 
 class SlurmLauncher:
-    """Launcher for Slurm. The method ``start`` writes the record of a job to disk. The thread of the launcher then
-    submits exactly one job for each record, and tries again after failures.
+    """Launcher for Slurm. ``start`` writes the record of a job to disk. The thread then submits exactly one job for
+    each record, and tries again after failures.
     """
 
     queues = True
@@ -42,7 +42,7 @@ class SlurmLauncher:
         self._lock, self._thread = threading.Lock(), threading.Thread(target=self._work, name="slurm", daemon=True)
 
     def start(self, job: Job) -> SlurmWorker:
-        """Writes the record of the job to submit. Raises LaunchError if the record cannot be written."""
+        """Writes the record of a job that is to be submitted. Raises LaunchError if the record cannot be written."""
         try:
             profile = batch.profile_of(self._site, job.profile)
             starter = batch.starter(profile[1], job.ranks, partial(find_mpiexec, self._mpiexec), job.threads)
@@ -60,8 +60,8 @@ class SlurmLauncher:
         return self._take(job.run, SlurmWorker(job.folder, record, self._site, job.group, self._accounting))
 
     def find(self, run: str, folder: Path) -> Trace:
-        """Finds the job of a run by its record. An earlier server submitted the job, or wrote the record but was
-        stopped before it submitted the job. Raises OSError or ValueError.
+        """Finds the job of a run by its record. An earlier server has submitted the job, or has only written the record
+        before it ended. Raises OSError or ValueError.
         """
         try:
             record = batch.read_job(folder)
@@ -108,7 +108,7 @@ class SlurmLauncher:
             time.sleep(self._site.poll)
 
     def _round(self) -> None:
-        """Gets one job list from Slurm for all runs, then performs the next action of each run."""
+        """Reads the list of jobs from Slurm once for all runs, then performs the next action of each run."""
         with self._lock:
             self._workers = {run: worker for run, worker in self._workers.items() if not worker.over}
             workers = list(self._workers.items())
@@ -131,7 +131,9 @@ class SlurmLauncher:
                 return
 
     def _hand_over_arrays(self, workers: list[SlurmWorker]) -> set[str]:
-        """Returns the names of runs that must not be submitted in this turn."""
+        """Submits complete groups of runs as job arrays. Returns the names of the runs that must not be submitted alone
+        at present.
+        """
         try:
             return self._arrays.hand_over(workers)
         except (slurm_call.SlurmError, OSError) as error:
@@ -139,9 +141,8 @@ class SlurmLauncher:
             return {worker.name for worker in workers if worker.fresh or worker.waits_for_array}
 
     def _attend(self, run: str, worker: SlurmWorker, entries: list[Entry], arrays: Set[str]) -> bool:
-        """Performs the next action of one run. Returns False if the Slurm controller has not answered, so that the
-        launcher does not wait again for another run. A Slurm command that hangs is not repeated at once, and does not
-        delay other runs.
+        """Performs the next action of one run. Returns False if the controller of Slurm has not answered; the thread
+        then does not wait again for another run. A command that hangs is not repeated at once.
         """
         try:
             worker.turn(entries, arrays)

@@ -1,5 +1,5 @@
-"""A run that was submitted to Slurm. The job name identifies the run. The run's folder shows how the run ended; Slurm
-shows why the run waits.
+"""A run that was submitted to Slurm. The job name identifies the run. How the run has ended is read from its folder;
+why it waits is read from Slurm.
 """
 
 import time
@@ -20,32 +20,32 @@ from .accounting import Accounting
 from .job_end import exit_of
 
 _LAG = 5.0
-"""Time in s after the end of a job in which the last files of the job may still arrive over a network file system
-(chosen value)."""
+"""Time in s after the end of a job for which its last files may still be missing on a network file system (chosen
+value)."""
 _LATE = 10.0
-"""Time in s without new writes in a folder with an outcome, after which the run ends with this outcome for any state in
-Slurm (chosen value)."""
+"""Time in s without new data in a folder with an outcome, after which the run has ended for every state that Slurm
+reports (chosen value)."""
 _MOST = 20
-"""Largest number of jobs that are submitted for one run (chosen value). A further job is submitted only if Slurm lost
-the previous job."""
+"""Largest number of jobs that are submitted for one run (chosen value). A further job is submitted only if Slurm has
+lost the previous one."""
 _RELEASES = 3
-"""Number of times that a job is released after a node failed to start it (chosen value). A busy or restarting node
-recovers, but a broken node does not recover."""
+"""Largest number of times that a job is released after a node has failed to start it (chosen value). A node that is
+busy or restarting will work later; a broken node will not."""
 _POLITE, _LONGEST_PAUSE = 2.0, 60.0
-"""Delays in s until a request to Slurm is repeated after a temporary refusal: the first delay and the largest delay
-(chosen values)."""
+"""Delays in s before a request to Slurm is repeated after a temporary refusal: the first and the largest delay (chosen
+values)."""
 
 
 class SlurmWorker:
-    """A run as a job of Slurm. The methods before ``turn`` may be called from any thread and do not block; only the
-    launcher's thread calls ``turn``.
+    """A run as a job of Slurm. The methods before ``turn`` may be called from any thread and do not wait; only the
+    thread of the launcher calls ``turn``.
     """
 
     def __init__(
         self, folder: Path, job: Job, site: batch.Slurm, group: str = "", accounting: Accounting | None = None
     ) -> None:  # fmt: skip
-        """``job``: a new job, or a job that an earlier server submitted or recorded for submission. ``group``: runs to
-        submit as one job array; only for runs that were never submitted.
+        """Creates the worker. ``job``: record of a new job, or of a job that an earlier server has submitted or
+        recorded. ``group``: name of the runs that may be one job array, for a run that was never submitted.
         """
         self.folder = self._folder = folder
         self._job, self._site, self._accounting = job, site, accounting or Accounting()
@@ -59,7 +59,7 @@ class SlurmWorker:
 
     @property
     def name(self) -> str:
-        """Name of the job, and its index in a job array; the pair is unique."""
+        """Name of the job with the index of its task; it is unique."""
         return self._job.key
 
     @property
@@ -69,12 +69,12 @@ class SlurmWorker:
 
     @property
     def fresh(self) -> bool:
-        """True while the run may become a task of a job array, because the run was never submitted."""
+        """Whether the run was never submitted, so that it may become a task of a job array."""
         return bool(self.group) and not self._job.job and not self._stop
 
     @property
     def waits_for_array(self) -> bool:
-        """True if the run will be submitted as a task of a job array."""
+        """Whether the run will be submitted as a task of a job array."""
         waits = not self._job.job and self._job.task is not None and not self._stop and self._exit is None
         return waits and time.monotonic() >= self._not_before
 
@@ -105,7 +105,7 @@ class SlurmWorker:
         return f"Slurm job {number} is pending: {entry.reason}" if entry.state in slurm.PENDING else ""
 
     def exited(self) -> Exit | None:
-        """Returns the end of the run; None while its job waits or runs. If the folder has an outcome and no new writes,
+        """Returns the end of the run; None while its job waits or runs. If its folder has an outcome and no new data,
         the run has ended even if Slurm does not answer.
         """
         return self._exit or (Exit(None, False, "") if self._complete() else None)
@@ -118,33 +118,32 @@ class SlurmWorker:
             return False
 
     def stop(self) -> None:
-        """Asks the run to stop, by a file in its folder. Slurm cancels a waiting job and sends a signal to a running
-        job. Raises OSError if the file cannot be written.
+        """Asks the run to stop, by a file in its folder. The launcher's thread then cancels a pending job, or sends a
+        signal to a running job. Raises OSError if this file cannot be written.
         """
         (self._folder / layout.STOP_REQUEST).touch()
         self._stop = True
 
     def kill(self) -> None:
-        """Requests Slurm to kill the job."""
+        """Requests that the launcher's thread kills the job."""
         self._stop = self._kill = True
 
     # The launcher's thread --------------------------------------------------------------------------------------------
 
     @property
     def over(self) -> bool:
-        """True when no further command of Slurm is needed for the run."""
+        """Whether no further command of Slurm is needed for the run."""
         return self._exit is not None
 
     def silent(self, why: str) -> None:
-        """Records that Slurm does not answer; the last known state of the job stays."""
+        """Records that Slurm does not answer; the last state of the job stays."""
         self._away, self._why = self._away or time.monotonic(), why
 
     def turn(self, entries: list[Entry], arrays: Set[str] = frozenset()) -> None:
-        """Performs the next action of the run. ``entries``: the jobs with this name in the job list of Slurm;
-        ``arrays``: the ids of all job arrays with a task in the list. Raises SlurmError or OSError.
+        """Performs the next action of the run. ``entries``: the jobs with the name of this run in the list of Slurm;
+        ``arrays``: the numbers of all job arrays in the list. Raises SlurmError or OSError.
 
-        A Slurm controller that has crashed may have lost the start of a job; without this action the job would wait for
-        ever.
+        The start of a job may get lost when the controller of Slurm crashes; this method then submits the job again.
         """
         self._away = 0.0
         if self.waits_for_array or (self._job.task is not None and not self._job.job and not self._stop):
@@ -172,7 +171,7 @@ class SlurmWorker:
             self._notified = entry.state
 
     def _launch_again(self, entry: Entry) -> None:
-        """Releases a job that Slurm holds because a node failed to start the job."""
+        """Releases a job that Slurm holds because a node has failed to start it."""
         if self._released < _RELEASES:
             self._released += 1
             slurm.release(self._site.bin, entry.job)
@@ -201,12 +200,12 @@ class SlurmWorker:
             self._exit = Exit(None, False, "", (State.FAILED, Cause.LAUNCH, f"Slurm refuses the job: {error}"))
 
     def wait(self, why: str) -> None:
-        """Delays the next request after Slurm has temporarily refused a job; the delay doubles at each refusal."""
+        """Delays the next request after a temporary refusal; the delay doubles each time."""
         self._later, self._not_before = why, time.monotonic() + self._pause
         self._pause = min(2.0 * self._pause, _LONGEST_PAUSE)
 
     def leave_array(self) -> None:
-        """Submits the run as a single job, after Slurm refused its job array. Raises OSError."""
+        """Submits the run as a job of its own, because Slurm has refused the job array. Raises OSError."""
         job, self.group = self._job, ""
         profile = batch.profile_of(self._site, job.profile)
         fresh = batch.new_job(
@@ -221,8 +220,8 @@ class SlurmWorker:
         self._job = job
 
     def _chosen(self, entries: list[Entry]) -> Entry | None:
-        """Returns the running job, else the first job; cancels a second job, which a crash of the controller can
-        cause.
+        """Returns the running job, otherwise the first job. A second job, which a crash of the controller can cause, is
+        cancelled.
         """
         begun = slurm.begun(self._folder, self._job) if len(entries) > 1 else ""
         ordered = sorted(entries, key=lambda entry: (entry.job != begun, entry.state in slurm.FINAL, entry.job))
@@ -234,7 +233,7 @@ class SlurmWorker:
         return ordered[0] if ordered else None
 
     def _look_for_it(self, arrays: Set[str]) -> None:
-        """Handles a job list without a job of this name; acts only after two such lists in succession."""
+        """Handles a list of Slurm that does not contain the job; acts only after the second such list in a row."""
         self._missing += 1
         if self._missing < 2 or slurm.held(self._folder):
             return
@@ -251,13 +250,13 @@ class SlurmWorker:
 
     @property
     def _array_number(self) -> str:
-        """Returns the id of the job array that has the job as a task."""
+        """Returns the number of the job array to which the job belongs."""
         number, task, _ = self._job.job.partition("_")
         return number if task else ""
 
     def _others_began(self) -> bool:
-        """Whether another task of the job array has started: Slurm then has stored the whole array. A task that is
-        cancelled while it waits has no entry in the job list of Slurm.
+        """Whether another task of the job array has started; Slurm has then stored the whole array. A task that was
+        cancelled while it waited is not in the list.
         """
         if not self._array_number:
             return False
@@ -266,7 +265,7 @@ class SlurmWorker:
         return any(number.partition("_")[0] == self._array_number for number in begun)
 
     def _end(self, entry: Entry) -> None:
-        """Handles the end of the job. The files in the run's folder give the cause of the end."""
+        """Handles the end of a job. The cause of the end is read from the files in the run's folder."""
         self._ended = self._ended or time.monotonic()
         there = (self._folder / layout.OUTCOME).exists()
         begun = bool(slurm.begun(self._folder, self._job))
@@ -281,11 +280,13 @@ class SlurmWorker:
             self._accounting.note(self, entry.job)
 
     def took(self, found: Mapping[str, str]) -> None:
-        """Stores the accounting data of the last job of the run. Raises OSError if the data cannot be stored."""
+        """Stores the usage of the last job of the run, as the accounting database has reported it. Raises OSError if
+        the data cannot be stored.
+        """
         self.write_down(accounting={**self._job.accounting, **found})
 
     def _again(self, why: str) -> None:
-        """Submits another job, which continues from the checkpoint, unless a stop of the run was requested."""
+        """Submits another job, which continues from the last checkpoint, unless a stop of the run was requested."""
         if self._stop or self._job.attempt >= _MOST:
             self._exit = Exit(None, False, "", (State.LOST, Cause.NODE, f"{why}, attempt {self._job.attempt}"))
             return

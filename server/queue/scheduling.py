@@ -1,11 +1,12 @@
-"""Scheduling: which waiting runs start now, and why each of the other runs waits. The module has only pure functions.
+"""Scheduling: which waiting runs start now, and why each of the other runs waits. This module has only functions
+without side effects.
 
-Order of the queue: users with a higher priority first; then users with the least use for their share; among the runs of
-one user the higher priority, then the earlier run. The first run of the queue that does not fit into the free cores and
-memory has a reservation. A later run may start before the run with the reservation only if the later run does not delay
-it. The start causes no delay if the later run ends, by its time limit, before the estimated start of the reserved run;
-or if both runs fit, for any order in which the running runs end (Lifka, The ANL/IBM SP scheduling system, 1995:
-"EASY").
+Order of the queue: first by the priority of the user, then by the user's past usage of cores relative to the share of
+the user (less usage first), then by the priority of the run, then by time of submission. Free cores and memory are
+reserved for the first run of the queue for which they are not enough. A later run may start before this run only if it
+does not delay it. The later run causes no delay if its time limit ends before the estimated start of the reserved run,
+or if both runs fit together for every order in which the running runs end (Lifka, The ANL/IBM SP scheduling system,
+1995: "EASY").
 """
 
 import heapq
@@ -20,13 +21,13 @@ from conoid.cases.site.policy import Share
 from ..runs.events import Run
 
 _LEAST = 1.0
-"""Smallest number of core-seconds that a run has in the order of the queue (chosen value). The smallest number replaces
-a smaller or missing estimate of core-seconds."""
+"""Smallest number of core-seconds that a run counts in the order of the queue, also if its estimate is missing (chosen
+value)."""
 
 
 @dataclass(frozen=True)
 class Need:
-    """Cores, memory and time that a waiting run requests."""
+    """Cores, memory and time that a waiting run needs."""
 
     run: str
     owner: str
@@ -36,7 +37,7 @@ class Need:
     seconds: float = 0.0
     """Expected duration of the run, s; 0: unknown."""
     limit: float = math.inf
-    """Duration after which the run is stopped in any case, s."""
+    """Time after the start at which the run is stopped in any case, s."""
     priority: int = 0
     """Priority among the runs of its owner."""
     sweep: str = ""
@@ -44,8 +45,8 @@ class Need:
 
 @dataclass(frozen=True)
 class Busy:
-    """Cores and memory of a running run, and the Unix time of its expected end, s. An expected end of 0 is unknown: the
-    run may end at any moment.
+    """Cores and memory of a running run, and the Unix time of its expected end, s. If the expected end is 0, it is
+    unknown: the run may end at any moment.
     """
 
     cores: int
@@ -65,7 +66,7 @@ class Room:
         return need.cores <= self.cores and need.memory <= self.memory
 
     def less(self, *taken: Need | Busy) -> "Room":
-        """Returns the free cores and the free memory that remain beside the given runs."""
+        """Returns the free cores and memory that remain after the start of the given runs."""
         return Room(self.cores - sum(one.cores for one in taken), self.memory - sum(one.memory for one in taken))
 
 
@@ -83,14 +84,14 @@ def in_state(runs: Iterable[Run], state: State) -> list[Run]:
 
 
 def stranded(runs: Iterable[Run], looked_after: Set[str]) -> list[str]:
-    """Returns the open runs that are neither in the queue nor supervised."""
+    """Returns the open runs that are neither in the queue nor supervised, which is an error of the server."""
     waits = {State.ACCEPTED, State.QUEUED}
     return [run.id for run in runs if run.state not in waits and run.id not in looked_after]
 
 
 def ordered(needs: Iterable[Need], taken: Mapping[str, float], users: Mapping[str, Share]) -> list[Need]:
-    """Returns the queued runs in the order in which they should start. ``taken``: core-seconds that each owner has used
-    so far, including running runs.
+    """Returns the waiting runs in the order in which they should start. ``taken``: core-seconds that each owner has
+    used, including the running runs.
     """
     of_owner: dict[str, list[Need]] = {}
     for need in sorted(needs, key=lambda need: (-need.priority, need.run)):
@@ -123,9 +124,9 @@ def plan(
 ) -> Plan:
     """Plans the starts at the Unix time ``now``, s.
 
-    ``busy``: runs that use cores and memory of ``room``; ``queue``: waiting runs in order; ``blocked``: function that
-    returns why a run may not start, given the runs that start before it. A blocked run, and a run that needs more than
-    ``room``, delay no other run.
+    ``busy``: the runs that use cores and memory of ``room``; ``queue``: the waiting runs in order; ``blocked``:
+    function that returns why a run may not start if the given runs start before it. A run that is blocked, or that
+    needs more than ``room``, delays no other run.
     """
     made, starts, holds, first = Plan(), list[Need](), list(busy), None
     waits = 0
@@ -144,7 +145,9 @@ def plan(
 
 
 def _beyond(need: Need, room: Room) -> str:
-    """Returns why a run can never start, for example because the server was restarted with fewer cores."""
+    """Returns why a run can never start on this server, for example because the server was restarted with fewer cores;
+    empty if it can start.
+    """
     if need.cores > room.cores:
         return f"the run needs {counted(need.cores, 'slot')}, this server has {room.cores}: it cannot start here"
     if need.memory > room.memory:
@@ -161,15 +164,13 @@ def _reason(need: Need, room: Room, free: Room, waits: int) -> str:
 
 
 def _passes(need: Need, first: Need, busy: Sequence[Busy], free: Room, now: float) -> bool:
-    """Whether the run ``need`` can start without a delay of ``first``, the first run that does not fit into
-    ``free``.
-    """
+    """Whether the run ``need`` can start without delaying ``first``, the first run for which ``free`` is not enough."""
     return now + need.limit <= _earliest(first, busy, free, now) or _beside(need, first, busy, free)
 
 
 def _earliest(first: Need, busy: Sequence[Busy], free: Room, now: float) -> float:
-    """Returns the estimated Unix time at which ``first`` can start, s. A running run that exceeds its expected end may
-    end at any moment.
+    """Returns the estimated Unix time at which ``first`` can start, s. A running run that has exceeded its expected end
+    may end at any moment.
     """
     for one in sorted(busy, key=lambda one: one.ends):
         free = Room(free.cores + one.cores, free.memory + one.memory)
@@ -179,11 +180,12 @@ def _earliest(first: Need, busy: Sequence[Busy], free: Room, now: float) -> floa
 
 
 def _beside(need: Need, first: Need, busy: Sequence[Busy], free: Room) -> bool:
-    """Whether ``first`` can start at the same moment with and without ``need``, for any order in which the running runs
+    """Whether ``first`` can start at the same time with and without ``need``, for every order in which the running runs
     end.
 
-    The numbers of cores that may become free are the sums over subsets of ``busy``. The smallest sum of free cores with
-    which ``first`` can start must leave enough cores for ``need``. If ``first`` waits for memory, the result is False.
+    The numbers of cores that may become free are the sums over all subsets of ``busy``. The smallest of these numbers
+    with which ``first`` can start must leave enough cores for ``need``. If ``first`` is waiting for memory, the result
+    is False.
     """
     if free.memory - first.memory < need.memory:
         return False

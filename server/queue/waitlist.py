@@ -1,6 +1,4 @@
-"""The queue of the supervisor: cores and memory that each run needs, past use of each owner, and selection of the runs
-that start now.
-"""
+"""The queue of the supervisor: what each run needs, what each owner has used, and which runs start now."""
 
 import math
 import time
@@ -22,19 +20,19 @@ from .scheduling import Busy, Need, Room
 from .usage import Took, Usage
 
 _REST = 1.0
-"""Longest time in s between two schedulings (chosen value). Scheduling is repeated because past use decays with time,
-and because failed starts are tried again."""
+"""Largest time in s between two selections of the runs to start (chosen value). The selection is repeated because past
+usage decreases with time, and because failed starts are tried again."""
 
 
 @dataclass(frozen=True)
 class Held:
-    """Conditions outside of the queue under which a run waits."""
+    """Reasons outside of the queue for which a run waits."""
 
     now: Callable[[str], bool]
-    """Function that returns whether the start of the run was delayed to a later time."""
+    """Function that returns whether the start of a run was put off to a later time."""
     sweep: Callable[[Need, Iterable[Need]], str]
-    """Function that returns the reason why a run waits for other runs of its sweep; empty if the run does not wait. The
-    argument of the function is the list of the runs that have cores."""
+    """Function that returns why a run waits for other runs of its sweep; empty if it does not wait. The second argument
+    of the function is the list of runs that have cores."""
 
 
 class Waitlist:
@@ -43,8 +41,8 @@ class Waitlist:
     """
 
     def __init__(self, settings: Settings, queues: bool) -> None:
-        """Creates an empty queue. ``queues``: whether the launcher is a batch system with its own queue, which also
-        allocates memory.
+        """Creates an empty queue. ``queues``: whether the launcher is a batch system, which has a queue of its own and
+        also allocates memory.
         """
         self._settings, self._queues = settings, queues
         self._rules, self._quota = settings.site.queue, settings.site.quota
@@ -54,11 +52,11 @@ class Waitlist:
         self._due = 0.0
 
     def changed(self) -> None:
-        """Requests a scheduling at the next call of ``turn``."""
+        """Requests that the next call of ``turn`` selects runs."""
         self._due = 0.0
 
     def settled(self, before: Run | None, after: Run) -> None:
-        """Records the step of a run; adds the used core-seconds when the run releases its cores."""
+        """Records a change of a run; when the run releases its cores, adds its usage."""
         self._due = 0.0
         if before is not None and before.started and (after.state.final or not after.started):
             self.usage.add(Took(before.owner, before.cores, before.started, after.finished or time.time()))
@@ -67,11 +65,13 @@ class Waitlist:
             self._why.pop(after.id, None)
 
     def why(self, run_id: str) -> str:
-        """Returns the reason why a run waited at the last scheduling; empty for a run that does not wait."""
+        """Returns why a run was not started at the last selection; empty for a run that does not wait."""
         return self._why.get(run_id, "")
 
     def used(self, owner: str, runs: Iterable[Run]) -> float:
-        """Returns the decayed core-seconds of an owner, including the use of the running runs among ``runs``."""
+        """Returns the core-seconds of an owner, reduced by their age, including those of the running runs in
+        ``runs``.
+        """
         now = time.time()
         own = (run.cores * (now - run.started) for run in runs if run.owner == owner and run.started)
         return self.usage.of(owner, now) + sum(own)
@@ -98,8 +98,8 @@ class Waitlist:
         return Room(self._settings.slots) if memory is None else Room(self._settings.slots, float(memory))
 
     def _taken(self, working: Iterable[tuple[Run, Need]], now: float) -> dict[str, float]:
-        """Returns core-seconds by owner. A running run counts with its estimated core-seconds, or with the core-seconds
-        used so far if these are more.
+        """Returns the core-seconds of each owner. A running run counts with its estimate, or with the core-seconds used
+        so far if they are more.
         """
         taken = defaultdict(float, self.usage.all(now))
         for run, need in working:
@@ -125,8 +125,8 @@ class Waitlist:
         return blocked
 
     def _need(self, run: Run) -> Need:
-        """Returns the cores and memory that a run needs, from the run's folder, which is read once. If the folder of
-        the run is damaged, only the number of cores is known.
+        """Returns what a run needs, from the submission in its folder, which is read once. If the folder is damaged,
+        only the number of cores is known.
         """
         if run.id not in self._needs:
             try:
@@ -140,8 +140,8 @@ class Waitlist:
 def need_of(made: Submission, grace: float, room: float = math.inf) -> Need:
     """Returns the cores, memory and time that a submission needs.
 
-    ``grace``: time in s between the time limit of the run and the forced end. For parts that may break, the memory is
-    that of all tets as separate fragments, unless this memory exceeds ``room`` bytes.
+    ``grace``: time in s between the time limit of the run and the forced end. If parts can break, the memory is that of
+    all their tets as separate fragments, unless this exceeds ``room``, bytes.
     """
     seconds = made.estimate.get("seconds", made.estimate.get("core_seconds", 0.0) / made.cores)
     limit = math.inf if made.wall_time is None else made.wall_time + 2.0 * grace
@@ -153,5 +153,5 @@ def need_of(made: Submission, grace: float, room: float = math.inf) -> Need:
 
 
 def _busy(run: Run, need: Need) -> Busy:
-    """Returns a running run with its expected end."""
+    """Returns the cores and memory of a running run, and its expected end."""
     return Busy(run.cores, need.memory, run.started + need.seconds if run.started and need.seconds else 0.0)

@@ -1,5 +1,5 @@
-"""Middleware that finds the token of a request and delays the request until it may begin (module ``request_order``).
-The limits of requests are in the module ``user_limits``.
+"""Middleware that reads the token of a request, and lets the request wait until it may begin (module
+``request_order``). The limits of requests are in the module ``user_limits``.
 """
 
 import hashlib
@@ -19,27 +19,27 @@ from .thread_pool import asking
 from .tokens import check_token
 
 ALIVE = "/healthz"
-"""Path of /healthz. A request for /healthz waits only for its place in the request order, not for a token or a
-limit."""
+"""Path of the check whether the server process runs. Requests for it need no token and have no limits; they only wait
+for their turn."""
 LOCAL_OWNER = "local"
 """Owner of all runs on a server without access control."""
 _SEEN = 1000
-"""Number of recently valid tokens that are cached (chosen value)."""
+"""Number of tokens that are cached, those that were used last (chosen value)."""
 _FRESH = 1.0
-"""Time in s for which a valid token is not read again from the database; a revoked token is refused after this time
-(chosen value)."""
+"""Time in s for which a token counts as valid before it is read from the database again; a revoked token is refused
+after this time at the latest (chosen value)."""
 
 
 class Admission:
-    """Middleware of all requests. The application reads the token and the entry of the request (module ``user_limits``)
-    from the state of the ASGI scope.
+    """Middleware for all requests. The application reads the token and the entry of the request (module
+    ``user_limits``) from the state of the ASGI scope.
     """
 
     def __init__(self, app: ASGIApp, service: Service) -> None:
         self._app, self._service = app, service
         self._seen: OrderedDict[bytes, tuple[float, Token]] = OrderedDict()
-        """Valid tokens, by hash: time until which the token counts as valid, and the token. After this time a thread of
-        the owner reads the token from the database again."""
+        """Valid tokens by their hash: the time until which the token counts as valid, and the token. After this time a
+        thread reads the token from the database again."""
         self._turns = RequestOrder()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -114,8 +114,8 @@ class Admission:
 
 
 def _address(scope: Scope) -> str:
-    """Returns a name for a network address; the name differs from all user names, because user names contain no
-    blank.
+    """Returns a name for the network address of the client. The name contains a blank, so that it differs from all
+    names of users.
     """
     client = scope.get("client")
     return f"address {client[0]}" if client else "address"

@@ -17,8 +17,8 @@ from .admission import LOCAL_OWNER
 from .tokens import SCOPES
 
 RECHECK = 2.0
-"""Time in s between two checks of the token of a long answer (chosen value). A streamed answer ends at most 5 s after
-its token is revoked."""
+"""Time in s after which the token of a long answer is checked again (chosen value). A streamed answer ends 5 s after
+the revocation of its token at the latest."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class Identity:
 
 
 async def identify(request: Request, service: ServiceOf) -> Identity:
-    """Returns the identity of the caller; the middleware ``admission`` has read the token from the database. Raises
-    ServiceError with status 401 without a valid token.
+    """Returns the identity of the caller; the middleware ``admission`` has already read the token. Raises ServiceError
+    with status 401 without a valid token.
     """
     if not service.settings.auth:
         _same_machine_page(request)
@@ -56,7 +56,7 @@ def unauthorized() -> ServiceError:
 
 
 def _same_machine_page(request: Request) -> None:
-    """Refuses requests that another web site sends through the user's browser to a server without tokens."""
+    """Refuses a request that a page of another web site sends through the user's browser to a server without tokens."""
     host = request.url.hostname or ""
     if not loopback(host):
         raise ServiceError(403, "forbidden", f"Host {host!r}: a server without tokens answers on loopback names only")
@@ -84,7 +84,7 @@ Submitter = Annotated[Identity, Depends(requires("submit"))]
 
 
 class Pass:
-    """Limits a long answer to the validity of its token, and to ``seconds`` if a value is given."""
+    """Limits a long answer to the time for which its token is valid, and to ``seconds`` if given."""
 
     def __init__(self, service: Service, identity: Identity, seconds: float | None = None) -> None:
         self._service, self._identity = service, identity
@@ -93,11 +93,11 @@ class Pass:
 
     @property
     def left(self) -> float:
-        """Time until the next check of the token, s."""
+        """Time until the token is checked again, s."""
         return max(0.0, min(RECHECK, self._ends - time.monotonic()))
 
     async def holds(self) -> bool:
-        """False if the token is revoked or the time limit has passed."""
+        """Whether the token is still valid and the time limit has not passed."""
         now = time.monotonic()
         if now >= self._ends:
             return False
@@ -107,8 +107,8 @@ class Pass:
         return await self._service.pool.run(self._valid)
 
     def _valid(self) -> bool:
-        """Reads the token of the request again from the database. If the database does not answer, the streamed answer
-        continues.
+        """Whether the database still has the token of the request. If the database does not answer, the token counts as
+        valid.
         """
         token = self._identity.token
         try:

@@ -1,5 +1,5 @@
-"""Protection against slow clients: time limits for headers and for unread answers, and a limit of the number of
-connections.
+"""Protection against slow clients: time limits for the headers of requests and for answers that are not read, and a
+largest number of connections.
 """
 
 import asyncio
@@ -15,30 +15,32 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 BODY = 1 << 20
 """Largest size of a request body, bytes (module ``limits``)."""
 HEADER = 10.0
-"""Time in s within which the header of a request must arrive (chosen value). The time limit of a header begins at the
-first byte of the header or at the start of the connection."""
+"""Time in s within which the header of a request must arrive (chosen value). The time begins with the first byte of the
+header, or with the connection."""
 _PIECES, _PAUSE = 4, 0.5
-"""Number of pieces of a header that are parsed at arrival, and time in s between later parses (chosen values). A normal
-client sends its header in one piece; a parse takes 0.1 ms of the event loop."""
+"""Number of pieces of a header that are parsed when they arrive, and time in s between two parses of later pieces
+(chosen values). A normal client sends its header in one piece. A parse takes 0.1 ms of the event loop."""
 READ = 30.0
-"""Time in s within which a client must read part of an answer that waits to be sent (chosen value). A client that does
-not read for longer, such as a laptop in sleep, can send its request again."""
+"""Time in s within which a client must read a part of an answer that is ready to be sent (chosen value). A client that
+does not read for longer, such as a sleeping laptop, can repeat its request."""
 _SHARE, _MOST = 4, 8192
-"""Number of file descriptors for each allowed connection, and largest number of connections (chosen values). The server
-needs the remaining file descriptors for files."""
+"""Number of file descriptors per connection, and largest number of connections (chosen values). The other descriptors
+are for files."""
 _FILES = 65_536
-"""Number of file descriptors that the server requests from the operating system: more than the server uses (chosen
-value)."""
+"""Number of file descriptors that the server requests from the operating system (chosen value); it does not need so
+many."""
 _SOME = 64
-"""Number of oldest idle connections from which the server selects the connection to close; the selection takes 0.1 ms
+"""Number of idle connections, the oldest ones, among which the server selects the one to close; this takes 0.1 ms
 (chosen value)."""
 _ACCEPTED = 4
-"""Number of connections that asyncio accepts in one turn of the event loop: 0.5 ms (chosen value)."""
+"""Number of connections that asyncio accepts in one turn of the event loop; this takes 0.5 ms (chosen value)."""
 _FULL = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
 
 
 def raise_limit() -> int:
-    """Raises the limit of file descriptors as far as the system allows; returns the largest number of connections."""
+    """Raises the limit of file descriptors as far as the system allows; returns the largest number of connections that
+    this permits.
+    """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = _FILES if hard == resource.RLIM_INFINITY else min(_FILES, hard)
     if soft < wanted:
@@ -47,8 +49,8 @@ def raise_limit() -> int:
 
 
 class Connection(H11Protocol):
-    """An HTTP connection. The server closes a connection if its header is late, if its answers are not read, or if it
-    is idle when the limit of connections is reached.
+    """An HTTP connection. The server closes it if the header of a request is late, if the client does not read its
+    answer, or if it is idle and a new connection needs its place.
     """
 
     most = _MOST
@@ -56,15 +58,15 @@ class Connection(H11Protocol):
     idle: dict["Connection", None] = {}  # noqa: RUF012
     """Connections without a complete request, oldest first."""
     owner = ""
-    """User of the last request's token; without a token, the network address of the client."""
+    """User of the token of the last request; without a token, the network address of the client."""
     _overdue: asyncio.TimerHandle | None = None
     _unread: asyncio.TimerHandle | None = None
     _pieces = 0
-    """Bytes of the incomplete request header."""
+    """Number of pieces in which the present header has arrived."""
     _useless = 0
-    """Number of bytes of a request body that arrived after the answer to the request."""
+    """Number of bytes of a request body that have arrived after its answer."""
     _left = 0
-    """Number of bytes that waited to be sent at the previous check."""
+    """Number of bytes that waited to be sent when they were last checked."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Closes an idle connection when the limit of connections is reached."""
@@ -76,13 +78,15 @@ class Connection(H11Protocol):
             self._make_room()
 
     def _make_room(self) -> None:
-        """Closes one of the oldest idle connections: a connection without a token, else a connection of the user with
-        most connections.
+        """Closes one of the oldest idle connections: one without a token, otherwise one of the user with the most
+        connections.
         """
         some = list(islice(self.idle, _SOME))
         counts = Counter(one.who for one in some)
         oldest = max(some, key=lambda one: (one is not self, not one.owner, counts[one.who]))
-        del self.idle[oldest]  # no delay: each of many connections of one loop turn closes another one
+        del self.idle[
+            oldest
+        ]  # at once, because each of several connections accepted in one turn of the loop must close another one
         if oldest is self:
             self.transport.write(_FULL)
             self.transport.close()
@@ -91,7 +95,7 @@ class Connection(H11Protocol):
 
     @property
     def who(self) -> str:
-        """Returns the user of a connection; without a user, the network address of the client."""
+        """Returns the user of the connection; without a user, the network address of the client."""
         return self.owner or (self.client[0] if self.client else "")
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -102,9 +106,9 @@ class Connection(H11Protocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Handles received bytes. The time limit of a header begins with its first byte; further bytes do not extend
-        the time limit. A header that arrives in many pieces is parsed at intervals. After an answer, the server reads
-        at most ``BODY`` further bytes of the request body.
+        """Handles received bytes. The time limit of a header begins with its first byte; later bytes do not extend it.
+        A header that arrives in many pieces is parsed at intervals. After the answer, the server reads at most ``BODY``
+        more bytes of the request body.
         """
         if self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY:
             self._useless += len(data)
@@ -132,21 +136,23 @@ class Connection(H11Protocol):
             self.transport.resume_reading()
 
     def on_response_complete(self) -> None:
-        """Marks the connection as idle after the request is complete. The server may close an idle connection to make a
-        new connection possible.
+        """Marks the connection as idle after the request is complete. The server may close an idle connection to make
+        room for a new one.
         """
         super().on_response_complete()
         if not self.transport.is_closing():
             self.idle[self] = None
 
     def pause_writing(self) -> None:
-        """Starts the time limit of an unread answer, if the client reads more slowly than the server sends."""
+        """Starts the time limit for reading the answer; asyncio calls this method when the client reads more slowly
+        than the server sends.
+        """
         super().pause_writing()
         self._left = self.transport.get_write_buffer_size()
         self._unread = self.loop.call_later(READ, self._look)
 
     def resume_writing(self) -> None:
-        """Ends the time limit of an unread answer, because the client has read the answer."""
+        """Ends the time limit for reading the answer; asyncio calls this method when the client has read enough."""
         super().resume_writing()
         self._look_no_more()
 
@@ -173,7 +179,7 @@ class Connection(H11Protocol):
 
 
 def options() -> dict[str, Any]:
-    """Options of uvicorn."""
+    """Returns the options of uvicorn."""
     Connection.most = raise_limit()
     return {"http": Connection, "backlog": _ACCEPTED}
 

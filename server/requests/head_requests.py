@@ -1,4 +1,6 @@
-"""HEAD requests for every route with GET. The answer to HEAD has the headers of the answer to GET and no body."""
+"""HEAD requests for every route with GET. The answer to a HEAD request has the headers of the answer to GET and no
+body.
+"""
 
 import anyio
 from starlette.types import ASGIApp, Message, Receive, Scope, Send

@@ -1,5 +1,5 @@
-"""Checks of a request before it uses resources: unknown parameters, large bodies, cases above the limits, full queues
-and full disks.
+"""Checks of a request before it uses resources: unknown parameters, large bodies, cases above a limit, a full queue, a
+full disk.
 """
 
 import asyncio
@@ -33,12 +33,13 @@ _BODY_TIMEOUT = 30.0
 
 
 _COUNTABLE = 1 << 53
-"""Number that represents a missing limit: the largest integer that every JSON reader has (IEEE 754)."""
+"""Number that stands for a missing limit in messages: the largest integer that every JSON reader supports (IEEE
+754)."""
 
 
 async def check_query(request: Request) -> None:
     """Raises ServiceError with status 400 for an unknown parameter, and for a parameter that is given twice but can
-    have only one value. An unknown parameter may be misspelt; without the error it would count as absent.
+    have only one value. An unknown parameter may be a misspelt one, which would otherwise be ignored.
     """
     if not request.query_params:
         return
@@ -67,8 +68,8 @@ def _query(dependant: Dependant) -> Iterator[Any]:
 
 
 async def read_body(request: Request) -> bytes:
-    """Returns the body of a request; at most ``BODY`` bytes are in memory. Raises ServiceError with status 415 for an
-    encoded body, 413 for a large body, 408 for a slow body, and 400 for an incomplete body.
+    """Returns the body of a request, of at most ``BODY`` bytes. Raises ServiceError with status 415 for an encoded
+    body, 413 for a large body, 408 for a slow body, and 400 for an incomplete body.
     """
     check_encoding(request)
     length = request.headers.get("content-length", "0")
@@ -83,9 +84,7 @@ async def read_body(request: Request) -> bytes:
 
 
 def check_encoding(request: Request) -> None:
-    """Raises ServiceError with status 415 for an encoded request body, because the decoded size is unknown before
-    decoding.
-    """
+    """Raises ServiceError with status 415 for an encoded request body, because its decoded size is not known."""
     encoding = request.headers.get("content-encoding", "identity").strip().lower()
     if encoding not in {"", "identity"}:
         detail = f"Content-Encoding {encoding[:80]!r}: a request body must not be encoded"
@@ -107,7 +106,7 @@ def _too_large(length: int) -> ServiceError:
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """Resources that a case needs, with the limits of this server; None: no limit."""
+    """The resources that a case needs, and the limits of this server; None: no limit."""
 
     slots: int
     elements: int | None
@@ -116,7 +115,8 @@ class Limits(msgspec.Struct, frozen=True):
     core_seconds: float | None
     wall_time: float | None
     threads: int | None = None
-    """Threads of each rank of a run whose case gives none; None: as many as the slots and its tets allow."""
+    """Threads of each rank of a run whose case gives none; None: as many as the free cores and the number of tets
+    allow."""
 
 
 def of(settings: Settings) -> Limits:
@@ -133,7 +133,7 @@ def check(case: Case, limits: Limits) -> list[Problem]:
 
 
 def on_threads(case: Case, tets: int | None, limits: Limits) -> Case:
-    """Returns the case with a number of threads, if it gives none."""
+    """Returns the case with a number of threads; the case stays unchanged if it gives one."""
     run = case.run
     if "threads" in run.model_fields_set:
         return case
@@ -143,7 +143,9 @@ def on_threads(case: Case, tets: int | None, limits: Limits) -> Case:
 
 
 def check_size(estimate: Estimate, caps: Limits) -> list[Problem]:
-    """Returns all resources of which the case needs more than the limit; an unknown amount is not refused."""
+    """Returns a problem for each resource of which the case needs more than the limit. A need that is not known gives
+    no problem.
+    """
     needs = (
         ("parts", "elements", count, estimate.elements, caps.elements),
         ("run.end_time", "steps", count, estimate.steps, caps.steps),
@@ -167,8 +169,8 @@ def _cores(case: Case, settings: Limits) -> Iterator[Problem]:
 
 
 def _files(case: Case) -> Iterator[Problem]:
-    """Returns problems of files for which the case gives no hash. The paths in a case are valid on the machine on which
-    the case was written, not on the server.
+    """Returns a problem for each file for which the case gives no hash. The paths in the case are valid only on the
+    machine on which the case was written.
     """
     for file in files_of(case.model_dump(include={"parts"})):
         if file.sha256 is None:
@@ -183,8 +185,8 @@ def _time(case: Case, caps: Limits) -> Iterator[Problem]:
 
 
 def figures(estimate: Estimate) -> dict[str, int | float]:
-    """Returns the known numbers of an estimate: elements, nodes, dt, steps, memory_bytes, core_seconds, and seconds
-    (wall time). For parts that may break, the estimate also has dust_bytes.
+    """Returns the numbers of an estimate that are known: elements, nodes, dt, steps, memory_bytes, core_seconds, and
+    seconds (wall time). If parts can break, also dust_bytes.
     """
     values = {
         "elements": estimate.elements,
@@ -207,7 +209,7 @@ def wall_time(case: Case, caps: Limits) -> float | None:
 
 
 def later(code: str, detail: str, hint: str | None = None) -> ServiceError:
-    """Returns an error with status 429: the user has reached a limit. A client may repeat the refused request later."""
+    """Returns the error with status 429: a user has reached a limit. The client may repeat the request later."""
     return ServiceError(429, code, detail, hint=hint, retryable=True, headers={"Retry-After": "60"})
 
 
@@ -221,8 +223,8 @@ def check_output(kept: int, quota: Quota) -> None:
 
 
 def check_room(runs: Path, open_runs: int, caps: Caps, more: int = 1) -> None:
-    """Raises ServiceError if ``more`` new runs exceed a limit. Status 429: the owner would have too many open runs;
-    422: the new runs alone are too many; 507: the disk is nearly full.
+    """Raises ServiceError if ``more`` new runs would exceed a limit. Status 429: the owner would have too many open
+    runs; 422: the new runs alone are too many; 507: the disk is nearly full.
     """
     if more > max(1, caps.queued):
         raise ServiceError(422, "invalid_sweep", f"{more} points; this server allows {caps.queued} open runs of a user")

@@ -1,16 +1,16 @@
-"""Filter that limits repeated lines in the log, so that the log does not fill the disk."""
+"""Filter for the log: it limits how often a line is repeated, so that the log does not fill the disk."""
 
 import logging
 import threading
 import time
 
 _MOST, _WINDOW = 20, 60.0
-"""Largest number of log lines of one kind, and the time in s in which the lines are counted. The chosen number of lines
-is enough to see the cause."""
+"""Largest number of log lines of one kind within a time, and this time in s. Twenty lines in a minute are enough to see
+the cause (chosen values)."""
 
 
 class FloodFilter(logging.Filter):
-    """Filter of log lines for a handler of the log. Log lines are of one kind if the same line of the source code
+    """Filter of log lines for a handler of the log. Log lines are of the same kind if the same line of the source code
     writes them.
     """
 
@@ -20,8 +20,8 @@ class FloodFilter(logging.Filter):
         self._seen: dict[tuple[str, int], tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Returns False if a log line is above the limit. The next written line of the same kind contains the number of
-        dropped lines.
+        """Returns False if a log line is above the limit. The next line of the same kind that is written gives the
+        number of lines that were dropped.
         """
         place, now = (record.pathname, record.lineno), time.monotonic()
         with self._lock:

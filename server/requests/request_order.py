@@ -1,8 +1,8 @@
-"""Order in which requests begin: one request in each turn of the event loop, users in rotation.
+"""The order in which requests begin: one request in each turn of the event loop, and users in rotation.
 
-An answer without computation takes 0.5 to 0.8 ms of the event loop; a GET that reads a file waits for the event loop
-ten times. If all waiting requests began in one turn of the event loop, a user with 40 connections would delay each wait
-of other users by 20 ms or more (docs/reference/load.md, "Beside an attacker").
+A request without computation takes 0.5 to 0.8 ms of the event loop. A GET request that reads a file returns to the
+event loop ten times. If all waiting requests began in the same turn, a user with 40 connections would delay each of
+these returns for other users by 20 ms or more (docs/reference/load.md, "Beside an attacker").
 """
 
 import asyncio
@@ -10,12 +10,11 @@ from collections import OrderedDict, deque
 
 
 class RequestOrder:
-    """Queue of requests that have not begun. The class is used only in the thread of the event loop."""
+    """Queue of the requests that have not begun. The class is used only in the thread of the event loop."""
 
     def __init__(self) -> None:
         self._lines: OrderedDict[str, deque[asyncio.Future[None]]] = OrderedDict()
-        """Requests that have not begun, by user. The next request to begin is a request of the first user in this
-        dictionary."""
+        """Requests that have not begun, by user. The first user in the dictionary is the next one."""
         self._called = False
 
     async def wait(self, who: str) -> None:
@@ -29,7 +28,7 @@ class RequestOrder:
         await turn
 
     def _begin(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begins one request. While other requests wait, schedules itself for the next turn of the event loop."""
+        """Begins one request. If further requests wait, it calls itself again in the next turn of the event loop."""
         while self._lines:
             who, line = self._lines.popitem(last=False)
             turn = line.popleft()

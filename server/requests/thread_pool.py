@@ -1,8 +1,8 @@
-"""Pool of threads for tasks that may block: disk, database, long computations.
+"""Pool of threads for work that may take long or wait: disk, database, computations.
 
 The number of threads of each user is limited. The event loop never waits for a disk. A request whose task takes too
-long is answered with status 503. The thread of a task that takes too long stays in use until the task ends. Therefore a
-disk that hangs blocks at most as many threads as the limit allows.
+long is answered with status 503. The thread of such a task stays in use until the task ends; therefore a disk that
+hangs blocks only as many threads as the limit of the user allows.
 """
 
 import asyncio
@@ -20,10 +20,10 @@ from ..errors import ServiceError
 P = ParamSpec("P")
 T = TypeVar("T")
 THREADS = 64
-"""Largest number of threads for all users (chosen value). A disk answers some ten requests at a time, and a thread
+"""Largest number of threads of all users together (chosen value). A disk serves some ten requests at once, and a thread
 needs some 100 kB."""
 asking: ContextVar[str] = ContextVar("asking", default="nobody")
-"""The user of the present request: a user name, or a network address."""
+"""User of the present request: a user name, or a network address."""
 
 
 @dataclass(eq=False)
@@ -40,8 +40,8 @@ class ThreadPool:
 
     def __init__(self, each: int, waiting: int, patience: float, most: int = THREADS) -> None:
         """Creates the pool. ``each``: largest number of threads of one user; ``waiting``: largest number of waiting
-        tasks of one user; ``most``: largest number of threads of all users; ``patience``: longest time in s of a task,
-        including its waiting time.
+        tasks of one user; ``most``: largest number of threads of all users; ``patience``: largest time in s of a task,
+        including the time that it waits.
         """
         self._each, self._waiting, self._patience, self._most = each, waiting, patience, most
         self._jobs: dict[str, deque[_Job]] = {}
@@ -50,9 +50,8 @@ class ThreadPool:
         self._threads = self._busy = 0
 
     async def run(self, work: Callable[P, T], *args: P.args, **words: P.kwargs) -> T:
-        """Returns the result of the function ``work``, computed in a thread for the user; raises the errors of
-        ``work``. Raises ServiceError with status 429 if too many tasks of the user wait, with 503 if the task takes too
-        long.
+        """Returns the result of the function ``work``, which a thread calls for the user; raises its errors. Raises
+        ServiceError with status 429 if too many tasks of the user wait, with 503 if the task takes too long.
         """
         who, loop = asking.get(), asyncio.get_running_loop()
         waiting = self._jobs.setdefault(who, deque())
@@ -75,14 +74,14 @@ class ThreadPool:
         return ServiceError(503, "unavailable", detail, retryable=True, headers={"Retry-After": "5"})
 
     def _forget(self, job: _Job) -> None:
-        """Removes a task from its queue; a task that has started continues."""
+        """Removes a task that has not started from its queue."""
         if not job.begun:
             self._jobs[job.who].remove(job)
             if not self._jobs[job.who]:
                 del self._jobs[job.who]
 
     def _begin(self) -> None:
-        """Starts waiting tasks; users are served in turn."""
+        """Starts waiting tasks while threads are free; the users take turns."""
         while self._busy < self._most:
             who = next((who for who, jobs in self._jobs.items() if jobs and self._taken[who] < self._each), None)
             if who is None:
@@ -100,8 +99,8 @@ class ThreadPool:
             self._handed.put(job)
 
     def _work(self) -> None:
-        """Runs tasks in a thread. The thread is a daemon, so that a thread that hangs does not keep the server from
-        ending.
+        """Executes tasks, one after the other; the main function of a thread. The thread is a daemon, so that a task
+        that hangs does not keep the server from ending.
         """
         while True:
             job = self._handed.get()
@@ -112,7 +111,7 @@ class ThreadPool:
                 error = raised
             try:
                 job.loop.call_soon_threadsafe(self._end, job, value, error)
-            except RuntimeError:  # the event loop is closed because the server ends
+            except RuntimeError:  # the event loop is closed because the server is ending
                 return
             del job, value, error
 
@@ -123,7 +122,7 @@ class ThreadPool:
             del self._taken[job.who]
         if not job.done.done():
             job.done.set_result(value) if error is None else job.done.set_exception(error)
-            job.done.exception()  # marks the error as read, because the caller may have disconnected
+            job.done.exception()  # marks the error as read: the client may have disconnected
         self._begin()
 
 

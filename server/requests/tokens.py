@@ -17,8 +17,8 @@ SCOPES = {
 _PREFIX = "conoid"
 _OWNER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
 _NOBODY = Token("", "", "0" * 64, frozenset(), 0.0)
-"""Stored token that belongs to no user, because no hash is all zeros. A comparison with this token takes as long as a
-comparison with any other token."""
+"""Stored token of no user, with a hash of zeros that no secret has. A token that does not exist is compared with this
+stored token, so that the comparison takes as long as for an existing token."""
 
 
 class TokenError(StartError):
@@ -41,8 +41,8 @@ def create_token(store: Store, owner: str, scopes: frozenset[str]) -> str:
 
 
 def check_token(store: Store, text: str) -> Token | None:
-    """Returns the token of ``text``; None if ``text`` is not a valid token. A token with a wrong id takes as long to
-    refuse as a token with a wrong secret.
+    """Returns the token of ``text``; None if ``text`` is not a valid token. Refusing a token takes the same time if its
+    id does not exist as if its secret is wrong.
     """
     prefix, _, rest = text.partition("_")
     token_id, _, secret = rest.partition("_")
@@ -52,7 +52,5 @@ def check_token(store: Store, text: str) -> Token | None:
 
 
 def _hash(secret: str) -> str:
-    """Returns the hash of a secret. The secret has 256 random bits, so that a plain hash is safe against a search of
-    all secrets.
-    """
+    """Returns the hash of a secret. A plain hash is safe because the secret has 256 random bits."""
     return hashlib.sha256(secret.encode()).hexdigest()

@@ -1,7 +1,7 @@
-"""Limits for each user: number of requests in progress, and number of long answers.
+"""Limits for each user: number of requests in progress, and number of long answers (event streams, downloads).
 
-A request is in progress until its answer is sent; therefore the limit also bounds the request bodies and answers in
-memory.
+A request is in progress until its answer is sent. The limit therefore also bounds the memory of request bodies and
+answers.
 """
 
 import asyncio
@@ -16,19 +16,19 @@ from conoid.cases.site.policy import Http
 from .thread_pool import busy
 
 PATIENCE = 60.0
-"""Longest time in s that a request waits to begin (chosen value); most answers take less time."""
+"""Largest time in s that a request waits before it begins (chosen value); most answers take less."""
 
 
 class Place:
-    """Entry of one request among the requests in progress."""
+    """One request in the counts of its user."""
 
     def __init__(self, user_limits: "UserLimits", who: str) -> None:
-        """Creates the entry. ``who``: the user of the request."""
+        """Creates the entry of a request. ``who``: the user of the request."""
         self._user_limits, self._who = user_limits, who
         self.is_long = False
 
     def lengthen(self) -> None:
-        """Counts the answer as a long answer from now on, because the answer lasts as long as a run or a download.
+        """Counts the answer as a long answer from now on: it may last as long as a run or a download.
 
         Raises ServiceError with status 429 if the user has too many long answers.
         """
@@ -38,11 +38,11 @@ class Place:
 
 
 class UserLimits:
-    """Counts of requests by user. The class is used only in the thread of the event loop."""
+    """Counts of the requests of each user. The class is used only in the thread of the event loop."""
 
     def __init__(self, limits: Http, connections: int) -> None:
-        """Creates the counters. ``connections``: limit of connections of all users. A single user gets at most half of
-        the connections for waiting requests and long answers.
+        """Creates the counts. ``connections``: largest number of connections of all users. The waiting requests and
+        long answers of one user may have at most half of these connections.
         """
         self._requests = limits.requests
         self._waiting, self._streams = min(limits.waiting, connections // 4), min(limits.streams, connections // 4)
@@ -70,14 +70,14 @@ class UserLimits:
         finally:
             if place.is_long:
                 self._long[who] -= 1
-                self._long += Counter()  # only counts above 0 are stored
+                self._long += Counter()  # only counts above 0 stay
             else:
                 turn.release()
                 self._leave(who)
 
     def lengthen(self, who: str) -> None:
-        """Moves a request from the requests in progress to the long answers. Raises ServiceError with status 429 if the
-        user has too many long answers.
+        """Counts a request as a long answer, no more as a request in progress. Raises ServiceError with status 429 if
+        the user has too many long answers.
         """
         if self._long[who] >= self._streams:
             raise busy(

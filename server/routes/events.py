@@ -20,8 +20,8 @@ router = APIRouter()
 After = Annotated[int, Query(ge=0, description="the seq of the last event that is known")]
 
 _PAGE = 1 << 20
-"""Largest size in bytes of the events of one answer; an answer has at least one event. The size is limited because the
-answers of a user are in memory until they are sent (chosen value)."""
+"""Largest size in bytes of the events of one answer; an answer has at least one event. The answers of a user are in
+memory until they are sent (reason of the chosen value)."""
 Seconds = Annotated[
     float | None, Query(ge=0, le=86400, allow_inf_nan=False, description="s after which the answer ends; none: never")
 ]
@@ -33,7 +33,7 @@ def replay(
     run: OwnedRun, service: ServiceOf, after: After = 0, limit: Annotated[int, Query(ge=1, le=10_000)] = 1000
 ) -> Response:
     """Returns the events with ``seq`` above ``after``, oldest first: at most ``limit`` events, and at most about 1 MiB.
-    The field ``last`` is the ``seq`` for the next request; ``more`` is true if more events exist now.
+    ``last``: the number with which the next request begins; ``more``: whether there are more events now.
     """
     path = service.settings.runs / run.id / layout.JOURNAL
     found: list[journal.Line] = []
@@ -47,7 +47,7 @@ def replay(
 
 
 def _page(found: list[journal.Line], after: int, *, more: bool) -> Response:
-    """Returns the journal lines unchanged."""
+    """Returns an answer with the journal lines as they are."""
     last = found[-1].seq if found else after
     body = b'{"events":[%s],"last":%d,"more":%s}' % (
         b",".join(line.raw for line in found),
@@ -68,7 +68,7 @@ async def follow(
     seconds: Seconds = None,
 ) -> Response:
     """Sends server-sent events: past events after ``Last-Event-ID`` (or ``after``), then new events until the run ends.
-    If the run has ended and no event is left, the answer has status 204, after which a browser does not reconnect.
+    If the run has ended and no event is left, the status is 204; a browser then does not reconnect.
     """
     if last_event_id:
         if not last_event_id.isdecimal() or len(last_event_id) > 18:

@@ -16,9 +16,7 @@ from .runs import OwnedRun
 
 
 class _AnyPath(PathConvertor):
-    """Converter for the rest of an address. The rest of an address may contain line feeds, because names of files may
-    contain line feeds.
-    """
+    """Part of an address that may contain any characters, also line feeds, because names of files may contain them."""
 
     regex = "(?s:.*)"
 
@@ -26,22 +24,22 @@ class _AnyPath(PathConvertor):
 register_url_convertor("path", _AnyPath())
 router = APIRouter()
 _BEFORE = 5
-"""Number of slashes in an address before the name of a file."""
+"""Number of slashes in an address before the path of a file."""
 
 
 @router.get("/v1/runs/{run_id}/files")
 @blocking
 def listing(run: OwnedRun, service: ServiceOf) -> dict[str, Any]:
-    """Returns every file of the run: path, size in bytes, time of the last change. The answer to HEAD for a file
-    contains the sha256 of the file.
+    """Returns every file of the run: path, size in bytes, time of the last change. The answer to a HEAD request for a
+    file contains its SHA-256 hash.
     """
     entries = download.listing(service.settings.runs / run.id)
     return {"files": [_line(run, entry) for entry in entries]}
 
 
 def _line(run: Run, entry: download.Entry) -> dict[str, Any]:
-    """Returns the name of a file as text. Bytes of a name that are not UTF-8 are shown as ``\xff``; the url has the
-    exact name.
+    """Returns a file of the list as JSON. Bytes of its name that are not UTF-8 are written as ``\xff`` in ``path``;
+    ``url`` has the exact name.
     """
     name = os.fsencode(entry.path)
     return {

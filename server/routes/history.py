@@ -62,7 +62,7 @@ def columns(
 
 
 def _columns(found: Columns, names: list[str], points: int) -> bytes:
-    """Raises ServiceError with status 400 if the name of a column is unknown."""
+    """Returns the answer of the route. Raises ServiceError with status 400 if a column is unknown."""
     known = found.units
     if known and (strange := next((name for name in names if name not in known and name != "*"), None)):
         detail = f"name = {strange[:80]!r}: columns of numbers are: {', '.join(known)}"

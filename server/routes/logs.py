@@ -23,10 +23,10 @@ router = APIRouter()
 _CHUNK = 1 << 16
 """Number of bytes of a log file that are sent at once (chosen value)."""
 ALIVE = b"\0"
-"""Byte that is sent while a followed log file gets no new text, so that proxies do not close the connection. The text
-of a log file does not contain this byte."""
+"""Byte that is sent while a log that is followed gets no new text, so that proxies do not close the connection. Log
+files do not contain it."""
 _LOOK = 0.25
-"""Time in s between two reads of a followed log file."""
+"""Time in s between two readings of a log that is followed."""
 Rank = Annotated[str, PathParameter(pattern="^([0-9]{1,5}|launcher)$", description="a rank, or 'launcher'")]
 
 
@@ -56,8 +56,8 @@ async def log(
 
 
 async def _follow(service: Service, may: Pass, run_id: str, folder: Path, relative: str) -> AsyncIterator[bytes]:
-    """Yields new bytes of the log file without bytes 0; yields a byte 0 while no text is added. The log file may be
-    missing at first.
+    """Yields the new bytes of a log file, without its zero bytes; yields a zero byte while there is no new text. The
+    file need not exist yet.
     """
     offset, spoke = 0, time.monotonic()
     with service.wakeups.listen(run_id) as listener:

@@ -33,9 +33,9 @@ router = APIRouter()
 Body = Annotated[bytes, Depends(read_body)]
 _MOST_RANKS = _MOST_THREADS = 1_000_000
 _MOST_STEPS = 2**53
-"""Largest value of a number in a request (chosen value). The server has lower limits for most numbers."""
+"""Largest number that a parameter accepts (chosen value); the server has lower limits for most parameters."""
 _LAST = "z" * 22
-"""Text that is added to a prefix of an id; the result sorts after every id that begins with this prefix."""
+"""Text that, added to the beginning of an id, sorts after every id with this beginning."""
 MAX_WAIT = 60.0
 """Largest value of the parameter ``wait`` of a request, s."""
 
@@ -101,8 +101,8 @@ def _pages(service: Service, owner: str, chosen: Chosen, before: str | None, siz
 
 @blocking
 def owned_run(run_id: str, service: ServiceOf, identity: Reader) -> Run:
-    """Returns the run if the run belongs to the user. Raises the same ServiceError with status 404 for an unknown run
-    and for a run of another user.
+    """Returns a run of the user. An unknown run and a run of another user give the same ServiceError with status
+    404.
     """
     return find(service, identity, run_id)
 
@@ -123,7 +123,7 @@ def find(service: Service, identity: Identity, run_id: str) -> Run:
 
 
 def _gone(service: Service, run: Run) -> ServiceError:
-    """Returns an error with status 410 and the record of a removed run."""
+    """Returns the error with status 410 for a removed run, with its record."""
     line = service.removed_runs.get(run.id)
     why = f" ({line.why})" if line is not None else ""
     return ServiceError(
@@ -221,7 +221,7 @@ def cancel(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
 
 
 def ask_to_stop(service: Service, run_id: str) -> None:
-    """Requests a run to stop. Raises ServiceError with status 503 if the request cannot be recorded."""
+    """Requests that a run is stopped. Raises ServiceError with status 503 if the request cannot be recorded."""
     try:
         service.supervisor.cancel(run_id)
     except Exception as error:
@@ -286,7 +286,9 @@ def snapshot(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
 
 
 def _ask(service: Service, run: Run, request: str, words: str) -> Response:
-    """Writes a request file, which the worker reads. Raises ServiceError with status 409 or 503."""
+    """Writes the file with which the server asks the worker for something. Raises ServiceError with status 409 or
+    503.
+    """
     if run.state is not State.RUNNING:
         raise ServiceError(409, "not_running", f"run {run.id} is {run.state.value}; a run that is running {words}")
     try:

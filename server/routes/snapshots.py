@@ -78,7 +78,9 @@ def fragment(run: OwnedRun, service: ServiceOf, label: Label, if_none_match: Kno
 async def _sent(
     request: Request, service: Service, run: Run, path: str, size: int, tag: str, known: str
 ) -> Response:  # fmt: skip
-    """Returns a file of ``size`` bytes that never changes; ``tag`` is the ETag of the file."""
+    """Sends a file of ``size`` bytes that never changes. ``tag``: ETag of the file; ``known``: ETag that the client
+    has.
+    """
     headers = {"ETag": f'"{tag}"', "Cache-Control": "private, max-age=31536000, immutable"}
     if download.is_known(headers["ETag"], known):
         return Response(status_code=304, headers=headers)
@@ -86,7 +88,7 @@ async def _sent(
 
 
 def _announced(service: Service, run: Run, n: int) -> Snapshot:
-    """Returns the journal message about a snapshot. Raises ServiceError with status 404 if the run has no such
+    """Returns the journal message about snapshot ``n``. Raises ServiceError with status 404 if the run has no such
     snapshot.
     """
     found = service.histories.of(service.settings.runs / run.id / layout.JOURNAL)

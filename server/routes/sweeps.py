@@ -102,7 +102,9 @@ async def again(service: ServiceOf, identity: Submitter, sweep_id: str, body: Bo
 
 
 def _failed(service: Service, plan: Plan) -> dict[int, str]:
-    """Returns the points without a successful or open run, with the present runs of these points."""
+    """Returns the points whose run has failed or was removed, with these runs; points with a run that is open or has
+    succeeded are left out.
+    """
     good = {run.id for _, run in _pairs(service, plan) if not run.state.final or run.state is State.SUCCEEDED}
     return {n: run_id for n, run_id in enumerate(plan.runs) if run_id not in good}
 
@@ -128,7 +130,7 @@ def find(service: Service, identity: Identity, sweep_id: str) -> Plan:
 
 
 def _pairs(service: Service, plan: Plan) -> list[tuple[dict[str, Any], Run]]:
-    """Returns each point with its run; removed and unknown runs are left out."""
+    """Returns the changed values of each point with its run; points whose run was removed are left out."""
     kept = service.store.some(plan.runs)
     found = [run for run_id in plan.runs if (run := service.supervisor.current(run_id) or kept.get(run_id))]
     left = {run.id: run for run in service.existing.left(found)}

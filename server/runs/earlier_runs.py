@@ -1,4 +1,6 @@
-"""Runs of an earlier server. Each run's folder is read once; a failed reading is repeated."""
+"""Runs that an earlier server has left in the folder of runs. The folder of each run is read once; if this fails, it is
+read again later.
+"""
 
 import logging
 from collections.abc import Callable
@@ -24,15 +26,15 @@ class EarlierRuns:
     def __init__(
         self, runs: Path, store: Store, index: Index, launcher: Launcher, found: Callable[[Left], None]
     ) -> None:
-        """Creates the reader of earlier runs. The function ``found`` is called with each run that can be read, ended or
+        """Creates the reader of earlier runs. ``found``: function that is called with each run that was read, ended or
         open.
         """
         self._runs, self._store, self._index, self._launcher, self._found = runs, store, index, launcher, found
         self._failed: dict[Path, str] = {}
 
     def all(self) -> None:
-        """Reads every run that is not known to have ended; an empty folder counts as a run. Raises OSError or
-        SQLAlchemyError.
+        """Reads every run that is not known to have ended. A folder without a readable submission counts as a run, too.
+        Raises OSError or SQLAlchemyError.
         """
         ended, known, last = self._store.ended(), self._store.open(), ""
         emptied = set(known)
@@ -56,12 +58,12 @@ class EarlierRuns:
             self.take_up(path)
 
     def take_up(self, path: Path) -> None:
-        """Reads a run; logs an error once, and reads the run again at the next pass."""
+        """Reads a run. If this fails, logs the error once, and reads the run again later."""
         self._take_up(path, lambda: self._store.get(path.name))
 
     def _take_up(self, path: Path, known_of: Callable[[], Run | None]) -> None:
-        """Reads a run. The database is written only if its state is older than the state in the folder, so that a
-        thousand unchanged runs cause no writes.
+        """Reads a run. The database is written only if its state is older than that in the folder; a thousand unchanged
+        runs then cause no writes.
         """
         reason = self._failed.pop(path, "")
         try:

@@ -1,4 +1,4 @@
-"""End of a run without an outcome, from the files of the run: time of the end, last step, energies."""
+"""Data for the outcome of a run that has written none, from its files: time of the end, last step, energies."""
 
 import math
 from pathlib import Path
@@ -16,13 +16,13 @@ from .events import Run
 M = TypeVar("M", bound=Message)
 
 _BLOCK = 4 << 20
-"""Number of bytes of one read of a journal (chosen value)."""
+"""Number of bytes that are read from a journal at once (chosen value)."""
 _TYPE = slice(9, 13)
-"""Bytes of a journal line before the type of its message."""
+"""Position in a journal line of four characters that identify the type of its message."""
 
 
 class _LastLine(msgspec.Struct):
-    """Field of a journal message that contains the time of the message."""
+    """The field with the time of a journal message."""
 
     wall: float
 
@@ -31,8 +31,8 @@ _decoder = msgspec.json.Decoder(_LastLine)
 
 
 def when(path: Path) -> float:
-    """Returns the Unix time of the last sign of life of the run in ``path``, s. The time is that of the last message of
-    the journal, or of the outcome without a journal; 0 if neither file can be read.
+    """Returns the Unix time at which the run in the folder ``path`` has last written something, s. The time is that of
+    the last message of the journal; without a journal, that of the outcome; 0 if neither can be read.
     """
     try:
         return _decoder.decode(journal.last(path / layout.JOURNAL)).wall or _written(path)
@@ -48,9 +48,7 @@ def _written(path: Path) -> float:
 
 
 def so_far(outcome: Outcome, run: Run, path: Path) -> Outcome:
-    """Returns ``outcome``, completed with the last step, time and energies of the journal in ``path`` if the journal
-    has a step.
-    """
+    """Returns ``outcome`` with the last step, time and energies that the journal contains, if it contains a step."""
     started, progress, counts = _newest(path / layout.JOURNAL)
     if started is None:
         return outcome

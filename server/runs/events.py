@@ -1,5 +1,5 @@
-"""The state of a run in the server, the events that change the state, and the resulting actions. The module contains
-only data; the rules are in the module ``lifecycle``.
+"""The state of a run in the server, the events that change it, and the actions that follow from a change. This module
+has only data; the module ``lifecycle`` has the rules.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class Run:
     started: float = 0.0
     finished: float = 0.0
     stopping_for: Cause | None = None
-    """Reason of a requested stop, as a word."""
+    """Reason of a stop that was requested; None if none was requested."""
     threads: int = 1
     """Number of threads of each rank."""
     title: str = ""
@@ -46,8 +46,8 @@ class Admitted:
 
 @dataclass(frozen=True)
 class Granted:
-    """Event: enough cores are free for the run. ``batch``: whether the run was submitted to a batch system and waits in
-    its queue.
+    """Event: enough cores are free for the run. ``batch``: whether the run was only submitted to a batch system and
+    waits in its queue.
     """
 
     batch: bool = False
@@ -55,21 +55,21 @@ class Granted:
 
 @dataclass(frozen=True)
 class WorkerStarts:
-    """Event: a batch system has started the worker, at the Unix time ``at``, s."""
+    """Event: a batch system has started the worker at the Unix time ``at``, s."""
 
     at: float
 
 
 @dataclass(frozen=True)
 class WorkerWaits:
-    """Event: a batch system has stopped the worker. The worker continues from its last checkpoint when the batch system
-    starts the worker again.
+    """Event: a batch system has taken the cores from the worker. The worker will continue from its last checkpoint when
+    the batch system starts it again.
     """
 
 
 @dataclass(frozen=True)
 class LaunchFailed:
-    """Event: the worker cannot be started and will not be tried again."""
+    """Event: the worker cannot be started, and no further attempt will be made."""
 
     message: str
     cause: Cause = Cause.LAUNCH
@@ -77,8 +77,8 @@ class LaunchFailed:
 
 @dataclass(frozen=True)
 class LaunchPutOff:
-    """Event: the worker could not be started now, for example because the disk is full or no file descriptor is free.
-    The run stays in the queue.
+    """Event: the worker cannot be started at present, for example because the disk is full. The run stays in the
+    queue.
     """
 
     message: str
@@ -99,7 +99,7 @@ class WorkerRuns:
 
 @dataclass(frozen=True)
 class CancelAsked:
-    """Event: the owner has requested a cancel. ``handed``: whether a worker runs, or the run was submitted to a batch
+    """Event: the owner has requested a cancel. ``handed``: whether a worker runs or a job was submitted to a batch
     system.
     """
 
@@ -108,37 +108,36 @@ class CancelAsked:
 
 @dataclass(frozen=True)
 class WallTimeOver:
-    """Event: the run has reached its limit of wall time."""
+    """Event: the run has exceeded its limit of wall time."""
 
 
 @dataclass(frozen=True)
 class OutputOver:
-    """Event: the run's folder has reached its limit of bytes."""
+    """Event: the folder of the run has exceeded its largest size."""
 
 
 @dataclass(frozen=True)
 class GraceOver:
-    """Event: the worker did not stop within the grace period."""
+    """Event: the worker did not stop within the grace period after the request."""
 
 
 @dataclass(frozen=True)
 class WorkerExited:
-    """Event: the worker's processes have ended. ``code``: the exit code, or the negative signal number; None if the
-    exit code is unknown.
+    """Event: the worker's processes have ended. ``code``: the exit code, or the negative number of the signal; None if
+    unknown.
     """
 
     code: int | None
     outcome: Outcome | None
     out_of_memory: bool = False
     disk_failed: bool = False
-    """Whether the worker's disk is full, or the worker reported an error of its disk."""
+    """Whether the disk of the worker was full, or the worker has reported an error of its disk."""
     traces: str = ""
-    """Message about a worker that wrote no outcome."""
+    """Text about the end of a worker that has written no outcome, from its log."""
     reading: tuple[State, Cause, str] | None = None
-    """State, cause and message of the end from a batch system, for a run without an outcome."""
+    """State, cause and message of the end as a batch system reports them, for a run without an outcome."""
     at: float = 0.0
-    """Unix time of the end by the run's files, s; 0: the files do not have the time, so that the present time is
-    used."""
+    """Unix time of the end according to the files of the run, s; 0: unknown, so that the present time is used."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +151,7 @@ class Found:
     """Exit code from the log of the launcher; None if unknown."""
     disk_failed: bool = False
     at: float = 0.0
-    """Unix time of the last sign of life of the run in its files, s; 0 if no file has a time."""
+    """Unix time at which the run has last written something, s; 0 if unknown."""
 
 
 Event = (
@@ -173,16 +172,15 @@ Event = (
 )
 
 ONCE = (LaunchFailed, LaunchPutOff, Broken, Found)
-"""Types of events that occur only once for a run. If the handling of such an event fails, the event is stored and
-handled again later."""
+"""Events that occur only once for a run. If handling such an event fails, it is stored and handled again later."""
 
 # Actions --------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Journal:
-    """Action: append a Status line to the journal and publish the line. The action is used only while no worker writes
-    the journal.
+    """Action: append a Status line to the journal, and publish it. The action ``Journal`` is used only while no worker
+    writes the journal.
     """
 
     state: State
@@ -204,13 +202,13 @@ class Launch:
 
 @dataclass(frozen=True)
 class Adopt:
-    """Action: watch a worker that an earlier server started."""
+    """Action: supervise a worker that an earlier server has started."""
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Action: ask the worker to stop at its next step, and kill the worker if it does not stop. The reason ``why`` is
-    stored in the run's folder.
+    """Action: ask the worker to stop at its next step, and kill the worker if it does not stop. ``why``: the reason,
+    which is stored in the run's folder.
     """
 
     why: Cause

@@ -1,5 +1,5 @@
-"""Runs whose folder exists. A run that has ended and has no folder is in no list, no count and no sweep; requests for
-the run are answered with status 410.
+"""Runs whose folder exists. A run that has ended and whose folder is missing is in no list, no count and no sweep;
+requests for it get the status 410.
 """
 
 import errno
@@ -13,8 +13,8 @@ from ..database.identity import FILE
 from .events import Run
 
 _FRESH = 1.0
-"""Time in s for which a list of folders is used again; a run without a folder stays in lists for at most this time.
-Reading 10,000 names takes 5 ms (reason of the chosen value)."""
+"""Time in s for which the list of folders is used before it is read again; a run without a folder stays in lists for
+this time at most. Reading 10,000 names takes 5 ms (reason of the chosen value)."""
 
 
 class ExistingRuns:
@@ -27,12 +27,12 @@ class ExistingRuns:
         self._runs, self._reading = runs, threading.Lock()
         self._names: set[str] = set()
         self._gone: set[str] = set()
-        """Runs that were looked up individually and not found; each run is looked up once."""
+        """Runs that were looked up one by one and have no folder; each run is looked up only once."""
         self._read = -_FRESH
 
     def left(self, runs: Iterable[Run]) -> list[Run]:
-        """Returns the given runs, without runs that have ended and have no folder. The list of folders that is used is
-        at most ``_FRESH`` s old. Raises OSError if the folder of all runs cannot be read.
+        """Returns the given runs, without runs that have ended and have no folder. The list of folders is at most
+        ``_FRESH`` s old. Raises OSError if the folder of all runs cannot be read.
         """
         self._refresh()
         return [run for run in runs if not (run.state.final and self._is_gone(run.id))]
@@ -54,12 +54,12 @@ class ExistingRuns:
         return False
 
     def _is_gone(self, run_id: str) -> bool:
-        """Whether the run has no folder. A run that is newer than the list of folders is looked up once."""
+        """Whether the run has no folder. A run that is newer than the list is looked up once."""
         return run_id not in self._names and (run_id in self._gone or not self.there(run_id))
 
     def _refresh(self) -> None:
-        """Reads the list of folders again if it is old. One thread reads the folder of all runs; meanwhile other
-        threads use the previous list.
+        """Reads the list of folders again if it is old. Only one thread reads it; other threads use the previous list
+        meanwhile.
         """
         if time.monotonic() < self._read + _FRESH or not self._reading.acquire(blocking=False):
             return
@@ -72,8 +72,8 @@ class ExistingRuns:
             self._reading.release()
 
     def _require(self) -> None:
-        """Raises FileNotFoundError if the folder of all runs lacks the server's file. If the server's file is missing,
-        the disk may not be mounted, and no run counts as removed.
+        """Raises FileNotFoundError if the folder of all runs lacks the file of the server. If this file is missing, the
+        disk may not be mounted, and no run counts as removed.
         """
         if not (self._runs / FILE).exists():
             raise FileNotFoundError(errno.ENOENT, "the folder of all runs is missing at present", str(self._runs))

@@ -1,4 +1,4 @@
-"""The folder of a run: submission, case, outcome and process record. The files can be read without a server."""
+"""The folder of a run: its submission, case, outcome and process record. All files can be read without a server."""
 
 import hashlib
 import os
@@ -30,20 +30,19 @@ _ID = re.compile(r"[0-9a-z]{22}")
 _LETTERS = "0123456789abcdefghjkmnpqrstvwxyz"
 _NEW, _GONE = ".new-", ".gone-"
 APART = f"{_NEW}files-"
-"""Beginnings of the names of temporary folders, which a server removes when it starts."""
+"""Beginnings of the names of temporary folders; a server removes such folders when it starts."""
 _TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
-"""Names of the files of a run. A folder of a run contains at least one file with such a name, even if the file is
-damaged."""
+"""Names of files by which a folder is recognised as that of a run. At least one of them exists, possibly damaged."""
 _UNREADABLE = "outcome.unreadable.json"
 _TITLE = 200
-"""Largest number of characters of a title in lists: one or two lines of text (chosen value)."""
+"""Largest number of characters of a title in lists (chosen value)."""
 DAMAGED = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
-"""Errors of the operating system for a file that is missing, not regular (``whole.opened``), or not readable."""
+"""Errors of the operating system that mean that a file is missing, not regular (``whole.opened``), or not readable."""
 _NO_FILE = (FileNotFoundError, IsADirectoryError, NotADirectoryError)
 
 
 class Copy(msgspec.Struct, kw_only=True, frozen=True):
-    """A file that the case names. The run has a copy of the file: ``files/<sha256>`` with the suffix of the name."""
+    """A file that the case names. The run has a copy of the file: ``files/<sha256>`` with the ending of its name."""
 
     path: str
     """Name of the file in the case."""
@@ -51,7 +50,9 @@ class Copy(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Submission(msgspec.Struct, kw_only=True, frozen=True):
-    """File submission.json: the data of a run that a server without its database needs. All times are Unix times, s."""
+    """The file submission.json: the data of a run that a server needs if it has lost its database. All times are Unix
+    times, s.
+    """
 
     id: str
     owner: str
@@ -66,13 +67,13 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
     """Time limit of the run, s."""
     estimate: dict[str, int | float]
     labels: dict[str, str] = {}
-    """Labels that the submission gave to the run."""
+    """Labels that were given at submission."""
     profile: str = ""
     """Profile of the batch system; empty without a batch system."""
     priority: int = 0
     """Priority of the run among the runs of its owner."""
     wishes_sha256: str = ""
-    """Hash of the sent labels, profile and priority; empty in files of earlier servers."""
+    """Hash of the labels, the profile and the priority of the request; empty in files of earlier servers."""
     threads: int = 1
     """Number of threads of each rank."""
     files: list[Copy] = []
@@ -84,7 +85,7 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Process(msgspec.Struct, kw_only=True, frozen=True):
-    """File worker.json: the process of the run. A later process may have the same number but another ``started``."""
+    """The file worker.json: the process of the run. A later process with the same number has another ``started``."""
 
     pid: int
     started: int
@@ -107,7 +108,7 @@ def new_id() -> tuple[str, float]:
 
 
 def begin_after(run_id: str) -> None:
-    """Makes the ids of later calls sort after ``run_id``."""
+    """Ensures that later ids sort after ``run_id``."""
     global _last_stamp
     stamp = 0
     for letter in run_id[:11]:
@@ -127,9 +128,8 @@ def _letters(number: int, length: int) -> str:
 def create(
     runs: Path, submission: Submission, case: bytes, resolved: bytes, fill: Callable[[Path], None] | None = None
 ) -> Path:
-    """Creates the folder of an accepted run; the function ``fill`` adds further files. The folder appears with all its
-    files at once; the files are flushed to disk before the function returns. Raises OSError, and the errors of
-    ``fill``.
+    """Creates the folder of an accepted run. ``fill``: function that adds further files. The folder gets its name only
+    when all files are in it and on disk. Raises OSError, and the errors of ``fill``.
     """
     beside, folder = runs / f"{_NEW}{submission.id}", runs / submission.id
     accepted = Status(run=submission.id, seq=1, wall=submission.submitted, state=State.ACCEPTED)
@@ -154,7 +154,7 @@ def discard(runs: Path, run_id: str) -> None:
 
 
 def purge(runs: Path, run_id: str) -> None:
-    """Removes the folder of a run: renames the folder, then removes its files one by one. Raises OSError."""
+    """Removes the folder of a run: renames it, then removes its files. Raises OSError."""
     beside = runs / f"{_GONE}{run_id}"
     os.rename(runs / run_id, beside)
     durable.sync_folder(runs)
@@ -167,7 +167,7 @@ def runs_in(runs: Path) -> list[Path]:
 
 
 def scan(runs: Path) -> Iterator[Path]:
-    """Returns the folders of all runs, oldest first. Removes incomplete folders of a killed server."""
+    """Yields the folders of all runs, oldest first, and removes incomplete folders that a killed server has left."""
     for path in sorted(runs.iterdir()):
         if path.name.startswith((_NEW, _GONE)):
             shutil.rmtree(path, ignore_errors=True)
@@ -176,7 +176,7 @@ def scan(runs: Path) -> Iterator[Path]:
 
 
 def there(path: Path) -> bool:
-    """Whether the file exists; True if the folder of the file may not be read."""
+    """Whether a file exists; also True if its folder may not be read."""
     try:
         path.lstat()
     except (FileNotFoundError, NotADirectoryError):
@@ -207,7 +207,7 @@ def first(made: Submission) -> Run:
 
 
 def replay(accepted: Run, statuses: Iterable[Status]) -> Run:
-    """Returns the run with the changes in the Status lines of its journal."""
+    """Returns the run after the changes in the Status lines of its journal."""
     return reduce(_after, statuses, accepted)
 
 
@@ -239,14 +239,14 @@ def outcome_error(folder: Path) -> str:
 
 
 def write_outcome(folder: Path, ended: Outcome) -> None:
-    """Writes outcome.json completely or not at all; renames a damaged outcome.json. Raises OSError."""
+    """Writes outcome.json completely or not at all; a damaged outcome.json is renamed before. Raises OSError."""
     if outcome_error(folder):
         put_away(folder / layout.OUTCOME, folder / _UNREADABLE)
     durable.write(folder / layout.OUTCOME, outcome_to_json(ended))
 
 
 def put_away(path: Path, kept: Path | None = None) -> None:
-    """Renames an existing file to ``kept``, so that a new file can be written. Raises OSError."""
+    """Renames a file to ``kept``, if it exists, so that a new file can be written. Raises OSError."""
     if kept is not None and not kept.exists():
         os.replace(path, kept)
     elif path.is_dir():
@@ -256,12 +256,12 @@ def put_away(path: Path, kept: Path | None = None) -> None:
 
 
 def is_as_accepted(folder: Path, made: Submission) -> bool:
-    """Whether the case on disk equals the case that was checked at the submission. Raises OSError."""
+    """Whether the case on disk is the case that was checked at submission. Raises OSError."""
     return made.body_sha256 in {"", digest_of(made.case_file, whole.read(folder / made.case_file, links=False))}
 
 
 def digest_of(case_file: str, body: bytes) -> str:
-    """Returns the hash of a submitted case and of its content type."""
+    """Returns the hash of a submitted case together with its content type."""
     return hashlib.sha256(case_file.encode() + b"\0" + body).hexdigest()
 
 
@@ -292,7 +292,7 @@ def write_process(folder: Path, started: Process) -> None:
 
 
 def runs_for(folder: Path) -> float:
-    """Returns the time since the start of the recorded process, s, by the clock since the boot; 0 without a record."""
+    """Returns the time since the start of the recorded process, s; 0 without a record."""
     made = process(folder)
     if made is None or not made.started:
         return 0.0

@@ -1,5 +1,5 @@
-"""The database is an index over the folders of the runs; a row of the database may be older than the folder of its
-run.
+"""The runs in the database. The folders of the runs are the originals: a row of the database may be older than its
+folder.
 """
 
 import logging
@@ -14,21 +14,21 @@ from .retries import words
 
 _log = logging.getLogger("conoid.server")
 _REST = 5.0
-"""Time in s for which a failed database is not used (chosen value), so that the supervisor does not wait for the
-database again."""
+"""Time in s for which a database that has failed is not used, so that the supervisor does not wait for it again (chosen
+value)."""
 
 
 class Index:
     """Writes changed runs into the database. The class is used only in the supervisor's thread."""
 
     def __init__(self, store: Store) -> None:
-        """Creates the index with no unsaved run."""
+        """Creates the object; no run is unsaved."""
         self._store, self._rests_until = store, 0.0
         self.unsaved: set[str] = set()
-        """Runs whose latest change is not in the database yet."""
+        """Runs whose last change is not in the database yet."""
 
     def save(self, run: Run) -> bool:
-        """Adds a run to the database. Returns False, and logs an error, if the run cannot be added."""
+        """Writes the state of a run to the database. Returns False and logs an error if this fails."""
         self.unsaved.add(run.id)
         if time.monotonic() < self._rests_until:
             return False
@@ -42,8 +42,8 @@ class Index:
         return True
 
     def add(self, run: Run, key: str | None, labels: Mapping[str, str]) -> None:
-        """Adds a run to the database, or updates its row. A row of the database that cannot be updated keeps its old
-        values until the next try. Raises SQLAlchemyError if the run is not in the database.
+        """Adds a run to the database; if it is already there, updates its row. If the update fails, the row is written
+        again later. Raises SQLAlchemyError if the run is then not in the database.
         """
         try:
             self._store.add(run, key, labels)

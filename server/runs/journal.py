@@ -1,5 +1,5 @@
-"""File journal.jsonl: all events of a run; the state of the run is read from the journal. Only one process at a time
-writes the journal: the worker while it runs, the server before and after the worker.
+"""The file journal.jsonl: all messages of a run. The state of a run is read from the journal. Only one process at a
+time writes the journal: the worker while it runs, the server before and after the worker.
 """
 
 import os
@@ -14,18 +14,18 @@ from conoid.cases.reading import whole
 from conoid.cases.run import Cause, State
 
 _CHUNK = 1 << 18
-"""Number of bytes of one read of a journal: some hundred lines (chosen value)."""
+"""Number of bytes that are read from a journal at once: some hundred lines (chosen value)."""
 _LONGEST = 16 << 20
 """Largest size in bytes of a journal line that is read; a longer line is skipped. A report of 10,000 ranks has 2 MB
 (reason of the chosen limit)."""
 _PASSED = 256 << 20
-"""Number of bytes of a too long line that are skipped at a time: 0.1 s from memory (chosen value)."""
+"""Number of bytes of a too long line that are skipped at once: 0.1 s from memory (chosen value)."""
 DAMAGED = msgspec.MsgspecError, ValueError, RecursionError
-"""Errors of msgspec for damaged JSON, including text that is not UTF-8 and lists that are nested too deeply."""
+"""Errors that damaged JSON can cause, including text that is not UTF-8 and lists that are nested too deeply."""
 
 
 class _Head(msgspec.Struct):
-    """Fields that the server reads from every journal line; lines of a newer worker may have further fields."""
+    """The fields of a journal line that the server needs; lines of a newer worker may have further fields."""
 
     seq: int
     type: str
@@ -37,7 +37,7 @@ _status = msgspec.json.Decoder(Status)
 
 @dataclass(frozen=True)
 class Line:
-    """An event as the bytes of its journal line, without the line feed."""
+    """A message as its journal line, without the line feed."""
 
     seq: int
     type: str
@@ -45,8 +45,8 @@ class Line:
 
 
 class Tail:
-    """Reads a journal from its beginning while the file grows. The reader returns only complete lines of the journal. A
-    journal that does not exist yet is treated as empty.
+    """Reads a journal from its beginning and continues while the file grows. The reader returns only complete lines. A
+    journal that does not exist yet counts as empty.
     """
 
     def __init__(self, path: Path, after: int = 0) -> None:
@@ -55,7 +55,7 @@ class Tail:
         self._offset = _line_before(path, after) if after else 0
 
     def read(self) -> list[Line]:
-        """Returns the new events, at most about 256 kB; empty without new events."""
+        """Returns the new messages, at most about 256 kB; empty if there are none."""
         while True:
             chunk = self._chunk()
             if not chunk:
@@ -66,14 +66,14 @@ class Tail:
                 return lines
 
     def block(self, size: int) -> bytes:
-        """Returns the next complete lines of the journal unchanged, about ``size`` bytes; empty without new lines."""
+        """Returns the next complete lines as they are, about ``size`` bytes; empty if there are none."""
         chunk = self._chunk(size)
         self._offset += len(chunk)
         return chunk
 
     def _chunk(self, size: int = _CHUNK) -> bytes:
-        """Returns the next complete lines of the journal. A line that is longer than one read is read completely; a
-        line that is longer than ``_LONGEST`` is skipped.
+        """Returns the next complete lines. A line longer than ``size`` is read completely; a line longer than
+        ``_LONGEST`` is skipped.
         """
         try:
             with whole.opened(self._path, links=False) as file:
@@ -89,8 +89,8 @@ class Tail:
         return b""
 
     def _pass_over(self, descriptor: int) -> bool:
-        """Skips a line that is too long. Returns False while the end of the too long line has not been reached; the
-        rest of the line is skipped later.
+        """Skips a part of a line that is too long. Returns False if the end of the line is not reached; the next call
+        continues.
         """
         for _ in range(_PASSED // _LONGEST):
             data = os.pread(descriptor, _LONGEST, self._offset)
@@ -105,8 +105,8 @@ class Tail:
 
 
 def _line_before(path: Path, after: int) -> int:
-    """Returns the offset of a line with ``seq`` at most ``after``, close to the last such line. The number ``seq``
-    increases along the journal.
+    """Returns the position of a line with ``seq`` at most ``after``, near the last such line. The numbers ``seq``
+    increase along the journal.
     """
     if not path.exists():
         return 0
@@ -171,8 +171,8 @@ def last(path: Path) -> bytes:
 
 
 def _last_lines(descriptor: int, end: int) -> list[Line]:
-    """Returns journal lines before the offset ``end``. The last returned line is the last complete line before ``end``.
-    The result is empty if there is no line before ``end``. At most ``_LONGEST`` bytes of the journal are in memory.
+    """Returns complete journal lines before the position ``end``, including the last one. The result is empty if there
+    is no complete line. At most ``_LONGEST`` bytes are read.
     """
     window = _CHUNK
     while True:
@@ -186,9 +186,9 @@ def _last_lines(descriptor: int, end: int) -> list[Line]:
 
 
 def append(path: Path, status: Status) -> Status:
-    """Appends ``status`` with the next number to the journal and returns it with this number; flushes the line to disk
-    before it returns. Raises OSError if the line cannot be written. An incomplete last line, which a killed worker has
-    left, is removed first. The new line is removed if it cannot be written completely.
+    """Appends ``status`` with the next number ``seq``, flushes the line to disk, and returns the message with its
+    number. Raises OSError if the line cannot be written. Before, an incomplete last line that a killed worker has left
+    is completed or removed. If the line cannot be written completely, it is removed again.
     """
     with whole.appended(path, 0o600) as file:
         numbered = msgspec.structs.replace(status, seq=_mend(file.fileno()) + 1)
@@ -203,8 +203,8 @@ def append(path: Path, status: Status) -> Status:
 
 
 def _mend(descriptor: int) -> int:
-    """Returns the largest ``seq`` of the last journal lines, even if damaged lines follow. Text after the last line
-    feed is completed or removed.
+    """Completes or removes an incomplete last line, and returns the largest ``seq`` of the last lines. Damaged lines
+    have no ``seq`` and do not count.
     """
     size = os.fstat(descriptor).st_size
     end = _after_last_feed(descriptor, size)
@@ -218,7 +218,7 @@ def _mend(descriptor: int) -> int:
 
 
 def _after_last_feed(descriptor: int, size: int) -> int:
-    """Returns the offset of the text after the last line feed."""
+    """Returns the position after the last line feed."""
     while size:
         start = max(0, size - _CHUNK)
         end = os.pread(descriptor, size - start, start).rfind(b"\n") + 1

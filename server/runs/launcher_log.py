@@ -1,4 +1,6 @@
-"""The end of the ranks by the launcher's log, for a server that is not the parent process of the launcher."""
+"""The end of the ranks, read from the log of the launcher, for a server that is not the parent process of the
+launcher.
+"""
 
 import errno
 import os
@@ -9,37 +11,37 @@ from conoid.cases.output import layout
 from conoid.cases.reading import whole
 
 _TAIL = 1 << 14
-"""Number of bytes at the end of the log in which the launcher's banner is searched for; a banner has 700 bytes (reason
+"""Number of bytes at the end of the log in which the banner of the launcher is searched; a banner has 700 bytes (reason
 of the chosen value)."""
 _ABORTS = "Abort("
-"""Beginning of the line that MPICH writes for a rank that aborts all others."""
+"""Beginning of the line that MPICH writes for a rank that ends all others."""
 _LAST_WORDS = 300
-"""Largest number of characters of the last line that are shown (chosen value)."""
+"""Largest number of characters of the last line that are used (chosen value)."""
 _COMPLAINTS = [
     os.strerror(number).encode()
     for number in (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ESTALE, errno.EFBIG)
 ]
 _CODE = re.compile(rb"^=   EXIT CODE: (\d{1,3})$", re.MULTILINE)
 _PID = re.compile(rb"^=   PID (\d+) RUNNING AT ", re.MULTILINE)
-"""Banner that Hydra, the launcher of MPICH, prints if a rank ends before the other ranks. For a killed rank the banner
-contains the number of the signal."""
+"""Line in the banner that Hydra, the launcher of MPICH, prints if a rank ends before the others. If a signal killed the
+rank, the banner contains its number."""
 
 
 def exit_code(folder: Path) -> int | None:
-    """Returns the exit code of the rank that ended first, by the newest banner; None if the log has no banner."""
+    """Returns the exit code of the rank that ended first, from the last banner; None if there is no banner."""
     found = _CODE.findall(_tail(folder))
     return int(found[-1]) if found else None
 
 
 def rank_killed(folder: Path) -> int | None:
-    """Returns the process number of the rank that ended first, by the newest banner; None if the log has no banner."""
+    """Returns the process number of the rank that ended first, from the last banner; None if there is no banner."""
     found = _PID.findall(_tail(folder))
     return int(found[-1]) if found else None
 
 
 def last_words(folder: Path, log: Path | None = None) -> str:
-    """Returns the last line of the launcher's log, or of the given ``log``, that is neither a banner nor a line of MPI;
-    empty if there is no such line.
+    """Returns the last line of the log that is neither part of a banner nor a line of MPI; empty if there is none.
+    ``log``: another log than that of the launcher.
     """
     text = _tail(folder, log).decode(errors="replace")
     lines = [line.strip() for line in text.partition("=====")[0].splitlines() if not line.startswith(_ABORTS)]

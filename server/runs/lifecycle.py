@@ -1,5 +1,5 @@
-"""The state machine of a run as a pure function: (run, event) -> (run, actions). The state machine uses no clock, no
-file and no process.
+"""The state machine of a run as a function without side effects: (run, event) -> (run, actions). The state machine uses
+no clock, no file and no process.
 """
 
 from dataclasses import replace
@@ -38,14 +38,15 @@ from .events import (
 Next = tuple[Run, tuple[Action, ...]]
 
 _SIGKILL, _SIGTERM = 9, 15
-"""Numbers of signals that are equal on every POSIX system; the module imports no module of the operating system."""
+"""Numbers of the signals KILL and TERM, which are the same on every POSIX system; so this module imports no module of
+the operating system."""
 
 
 def advance(run: Run, event: Event, now: float) -> Next:
-    """Returns the run after ``event`` at the Unix time ``now``, s, and the actions in order.
+    """Returns the run after ``event`` at the Unix time ``now``, s, and the actions to perform, in order.
 
-    An event without meaning in the present state, such as a cancel of a finished run, changes nothing. Every change of
-    state obeys ``FOLLOWERS`` of conoid.cases.run.
+    An event that has no meaning in the present state, such as a cancel of a run that has ended, changes nothing. Every
+    change of state obeys ``FOLLOWERS`` of conoid.cases.run.
     """
     if run.state.final:
         return run, ()
@@ -96,8 +97,8 @@ def _enter(run: Run, state: State, message: str = "") -> Next:
 
 
 def _end(run: Run, now: float, outcome: Outcome, *, written: bool = False) -> Next:
-    """Returns the final state of the run by ``outcome``. The worker writes the outcome file before the final line of
-    the journal.
+    """Ends the run with the state of ``outcome``. The actions write the outcome before the last line of the journal.
+    ``written``: whether the worker has already written the outcome.
     """
     state, cause = State(outcome.state), Cause(outcome.cause) if outcome.cause else None
     ended = replace(run, state=state, cause=cause, message=outcome.message, finished=now)
@@ -106,8 +107,8 @@ def _end(run: Run, now: float, outcome: Outcome, *, written: bool = False) -> Ne
 
 
 def _broken(run: Run, event: Broken, now: float) -> Next:
-    """Marks the run as lost, or as cancelled if its owner has requested a cancel. Before the state changes, a worker
-    that may still run is killed.
+    """Ends a run whose folder cannot be used as lost, or as cancelled if its owner has requested a cancel. A worker
+    that may still run is killed before.
     """
     asked = run.stopping_for is Cause.CANCELLED
     state, cause = (State.CANCELLED, Cause.CANCELLED) if asked else (State.LOST, Cause.STORAGE)
@@ -131,7 +132,7 @@ def _cancel(run: Run, now: float, handed: bool) -> Next:
 
 
 def _stop(run: Run, why: Cause) -> Next:
-    """Changes the state without a line in the journal, because the worker now writes the journal."""
+    """Changes the state without a line in the journal, because at present the worker writes the journal."""
     return replace(run, state=State.STOPPING, stopping_for=why), (Stop(why),)
 
 
@@ -146,15 +147,15 @@ def _exited(run: Run, event: WorkerExited, now: float) -> Next:
 
 
 def _at(run: Run, event: WorkerExited | Found, now: float) -> float:
-    """Returns the time of the end of the run. If no server ran at the end of the run, the time is read from the run's
-    files.
+    """Returns the Unix time of the end of the run, s. If no server was running then, it is the time that the files of
+    the run give.
     """
     return max(event.at, run.started) if event.at else now
 
 
 def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
-    """Returns the cause of a stop. A worker records that it was stopped, but not why it was stopped. Without a request
-    for a cancel, a stop does not count as a cancel.
+    """Returns the outcome of a run that was stopped, with the cause of the stop. A worker records that it was stopped,
+    but not why. Without a request for a cancel, the stop does not count as a cancel.
     """
     if run.stopping_for is Cause.STORAGE:
         state, message = State.FAILED, "the output of the run is larger than this server allows"
@@ -170,12 +171,12 @@ def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
 
 
 def _readable(outcome: Outcome) -> bool:
-    """True if the outcome has a final state and a known cause."""
+    """Whether the outcome has a final state and a known cause."""
     return outcome.state in {state for state in State if state.final} and outcome.cause in {None, *Cause}
 
 
 def _without_outcome(run: Run, event: WorkerExited) -> Outcome:
-    """Returns the final state of a worker without an outcome. The exit code suggests a cause, but never proves
+    """Returns the outcome of a run whose worker has written none. The exit code suggests a cause, but never proves
     success.
     """
     state, cause, message = _reading_of(run, event)

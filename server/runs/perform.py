@@ -1,4 +1,6 @@
-"""Performs the actions of the module ``lifecycle``: writes journal and outcome; starts, adopts and stops workers."""
+"""Performs the actions of the module ``lifecycle``: writes the journal and the outcome; starts, supervises and stops
+workers.
+"""
 
 import logging
 import os
@@ -24,19 +26,19 @@ _log = logging.getLogger("conoid.server")
 
 
 class Performer:
-    """Performs actions. The class is used in the supervisor's thread; ``watches`` may be read from any thread."""
+    """Performs actions. The performer is used in the supervisor's thread; ``watches`` may be read from any thread."""
 
     def __init__(self, settings: Settings, launcher: Launcher, telemetry: Telemetry | None) -> None:
         """Creates the object without workers."""
         self._settings, self._launcher, self._telemetry = settings, launcher, telemetry
         self._root = os.stat(settings.runs).st_ino
         self.watches: dict[str, Watch] = {}
-        """Watches of the running workers, by run."""
+        """The supervision of each running worker, by the id of the run."""
         self.found: dict[str, Worker] = {}
-        """Workers of an earlier server that are not adopted yet."""
+        """Workers that an earlier server has started and that are not supervised yet."""
 
     def perform(self, run: Run, action: Action, now: float) -> None:
-        """Performs one action for ``run`` at the Unix time ``now``, s. Raises LaunchError, OSError and other errors."""
+        """Performs an action for ``run`` at the Unix time ``now``, s. Raises LaunchError, OSError and other errors."""
         path = self._settings.runs / run.id
         match action:
             case Journal(state, cause, message):
@@ -58,12 +60,12 @@ class Performer:
                 self._kill(run.id, path)
 
     def probe(self, run_id: str) -> None:
-        """Checks that files of the run can be written. Raises OSError if they cannot be written."""
+        """Tests whether files of the run can be written. Raises OSError if they cannot be written."""
         durable.probe(self._settings.runs / run_id)
 
     def gone(self, run_id: str) -> bool:
-        """Whether the run's folder is missing. Returns False if the folder of all runs was replaced because its disk is
-        missing.
+        """Whether the folder of the run is missing. If the folder of all runs was replaced, for example because its
+        disk is not mounted, the result is False.
         """
         try:
             same = os.stat(self._settings.runs).st_ino == self._root
@@ -77,8 +79,8 @@ class Performer:
         return watch is not None and watch.worker.exited() is None
 
     def beyond_use(self, run_id: str) -> bool:
-        """Whether files cannot be written in the run's folder, although they can be written in the folder of all
-        runs.
+        """Whether the folder of the run cannot be used: it is missing, or files cannot be written in it although they
+        can be written in the folder of all runs.
         """
         if self.gone(run_id):
             return True
@@ -89,7 +91,7 @@ class Performer:
         return True
 
     def _stop(self, run_id: str, path: Path, why: Cause) -> None:
-        """Records the request to stop a run; on a full disk only the database contains the request."""
+        """Records the request to stop a run in its folder; if the disk is full, only the database has the request."""
         try:
             folder.write_stop(path, why)
         except OSError as error:
@@ -128,9 +130,9 @@ class Performer:
         return self._watch(path, worker, made.wall_time)
 
     def _watch(self, path: Path, worker: Worker, allowed: float | None) -> Watch:
-        """Watches a worker until the time limit that the server applies. The worker itself ends at
-        ``run.max_wall_time``; the server stops the worker a grace period later; a batch system stops it at the limit of
-        the job.
+        """Returns the supervision of a worker, with the time limit at which the server stops it. The worker itself
+        stops at ``run.max_wall_time``. The server stops it a grace period later; a batch system stops it at the limit
+        of the job.
         """
         left = (
             None if allowed is None or self._launcher.queues else allowed + self._settings.grace - folder.runs_for(path)
@@ -139,7 +141,9 @@ class Performer:
 
 
 def _allowed(path: Path) -> float | None:
-    """Returns the time limit of a run from its submission, s. The worker applies its own time limit in any case."""
+    """Returns the time limit of a run from its submission, s; None: no limit. The worker has its own time limit in any
+    case.
+    """
     try:
         return folder.submission(path).wall_time
     except (OSError, msgspec.MsgspecError):
@@ -147,7 +151,7 @@ def _allowed(path: Path) -> float | None:
 
 
 def of_launch(error: LaunchError) -> LaunchFailed | LaunchPutOff:
-    """Returns the event of a failed launch. The launch is delayed if the error is temporary, or if an error of the disk
+    """Returns the event of a failed launch. The launch is put off if the error is temporary, or if an error of the disk
     makes the case unreadable.
     """
     if passing(error):

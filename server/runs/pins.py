@@ -1,5 +1,5 @@
-"""Runs that are kept permanently, by the label ``keep`` or by a later request. The last request to keep a run is a
-hidden file in the run's folder.
+"""Runs that the rules of the site must not remove, because of the label ``keep`` or of a later request. The last such
+request is a hidden file in the folder of the run.
 """
 
 from pathlib import Path
@@ -15,7 +15,7 @@ _PINNED, _YES, _NO = ".keep", "yes", "no"
 
 
 def pinned(folder: Path) -> bool:
-    """Whether the run is kept permanently: by the last request, or without a request by its label ``keep``."""
+    """Whether the run must be kept: by the last request; without a request, by its label ``keep``."""
     if request := last_request(folder):
         return request == _YES
     try:
@@ -33,8 +33,8 @@ def last_request(folder: Path) -> str:
 
 
 def labels(folder: Path) -> dict[str, str]:
-    """Returns the labels of the submission; the label ``keep`` follows the last request. If the run's folder is removed
-    or damaged, the result has no labels.
+    """Returns the labels of the submission. The label ``keep`` is changed by the last request. The result is empty if
+    the folder of the run is removed or damaged.
     """
     try:
         made = submission(folder).labels
@@ -45,5 +45,5 @@ def labels(folder: Path) -> dict[str, str]:
 
 
 def pin(folder: Path, keep: bool) -> None:
-    """Keeps a run permanently, or allows its removal again. Raises OSError if the request cannot be written."""
+    """Requests that a run is kept, or that it may be removed. Raises OSError if the request cannot be written."""
     durable.write(folder / _PINNED, (_YES if keep else _NO).encode())

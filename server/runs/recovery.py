@@ -1,4 +1,4 @@
-"""The state of a run after a restart of the server, from the run's folder and the processes of the machine."""
+"""The state of a run after a restart of the server, from its folder and from the processes of the machine."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +21,7 @@ _STOPPABLE = {State.QUEUED, State.STARTING, State.RUNNING, State.STOPPING}
 
 @dataclass(frozen=True)
 class Left:
-    """A run from its folder, with its idempotency key and the traces of its worker."""
+    """A run that an earlier server has left, with its idempotency key and its worker if it still runs."""
 
     run: Run
     key: str | None
@@ -30,8 +30,8 @@ class Left:
 
 
 def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
-    """Reads a run from its folder. ``known``: the row of the run in the database, which replaces damaged files. Raises
-    OSError; raises ValueError if neither the folder nor the row has the owner of the run.
+    """Returns the run in the folder ``path``. ``known``: the row of the run in the database, which replaces damaged
+    files. Raises OSError; raises ValueError if neither the folder nor the database contains the owner of the run.
     """
     made = _submission(path)
     if made is None and known is None:
@@ -55,7 +55,7 @@ def _submission(path: Path) -> Submission | None:
 
 
 def _outcome(path: Path) -> Outcome | None:
-    """Returns the submission of the run; None if it cannot be read."""
+    """Returns the outcome of the run; None if it is missing or cannot be read."""
     try:
         return folder.outcome(path)
     except PermissionError:
@@ -78,8 +78,8 @@ def _as_accepted(known: Run | None) -> Run:
 
 
 def _fate(path: Path, trace: Trace) -> Literal["none", "alive", "gone"]:
-    """Returns the process record of the run. A process record that cannot be read still proves that the run was
-    launched.
+    """Returns whether the run has no worker yet, a worker that is alive, or a worker that has ended. A process record
+    that cannot be read still proves that a worker was started.
     """
     if trace.worker is not None:
         return "alive"
@@ -87,8 +87,9 @@ def _fate(path: Path, trace: Trace) -> Literal["none", "alive", "gone"]:
 
 
 def _mended(run: Run, journal_there: bool, known: Run | None, path: Path, trace: Trace, queues: bool) -> Run:
-    """Returns the status of a run whose journal is missing or older than its processes. A run that was started is never
-    started twice. A run that was submitted to a batch system (``queues``) may still wait for its cores.
+    """Returns the run with a corrected state, if its journal is missing or older than its processes. A run that was
+    started is never started twice. ``queues``: whether the launcher is a batch system, in whose queue the run may still
+    wait for cores.
     """
     if not journal_there and known is not None:
         run = replace(known, message="") if known.state is not State.STOPPING else replace(run, state=State.STARTING)
@@ -103,8 +104,8 @@ def _launched(path: Path, trace: Trace) -> bool:
 
 
 def _stopping(run: Run, known: Run | None, path: Path, queues: bool) -> Run:
-    """Returns the state of a waiting job that reported a stop without a request. A job without outcome was preempted
-    and continues; after a request to stop, the job has ended.
+    """Returns the state of a waiting job whose journal reports a stop. A job that has no outcome and was not requested
+    to stop was interrupted and will continue; after a request to stop, it has ended.
     """
     why = folder.stop_asked(path) or (known.stopping_for if known is not None else None)
     if why is None and queues and run.state is State.STOPPING:

@@ -1,4 +1,6 @@
-"""Restart: a new run continues from a checkpoint of another run, and has links to the files of the other run."""
+"""Restart: a new run continues from a checkpoint of another run. The new run has hard links to the files of the other
+run.
+"""
 
 import json
 import os
@@ -15,14 +17,14 @@ from ..errors import ServiceError
 from .folder import outcome
 
 _TRIES = 5
-"""Number of tries to find the newest checkpoint, because the running run may remove it meanwhile (chosen value)."""
+"""Number of attempts to link the newest checkpoint: a run that is running may remove it meanwhile (chosen value)."""
 LABEL = "restart"
-"""Key of the label in which a new run stores the id of the run that it continues."""
+"""Name of the label of the new run whose value is the id of the run that it continues."""
 
 
 def body(case: Path, ranks: int | None, threads: int | None = None, max_steps: int | None = None) -> dict[str, object]:
-    """Returns the case of a run with changed ranks, threads and ``run.max_steps``; a value of None changes nothing.
-    Raises CaseError or OSError.
+    """Returns the case of a run with other ranks, threads and ``run.max_steps``; None changes nothing. Raises CaseError
+    or OSError.
     """
     whole.check(case)
     wanted = {"run.ranks": ranks, "run.threads": threads, "run.max_steps": max_steps}
@@ -30,8 +32,8 @@ def body(case: Path, ranks: int | None, threads: int | None = None, max_steps: i
 
 
 def check(source: Path, max_steps: int | None) -> None:
-    """Raises ServiceError with status 409 if a run that continues ``source`` has no step left. ``max_steps``: None for
-    the value in the case of ``source``.
+    """Raises ServiceError with status 409 if a run that continues ``source`` would have no step left. ``max_steps``:
+    None stands for the value in the case of ``source``.
     """
     ended = outcome(source)
     spent = ended is not None and ended.cause == Cause.STEPS
@@ -44,10 +46,10 @@ def check(source: Path, max_steps: int | None) -> None:
 
 
 def fill(source: Path, folder: Path) -> None:
-    """Links the checkpoints, frames and history of ``source`` into the new run.
+    """Makes links to the checkpoints, frames and history of ``source`` in the folder of the new run.
 
-    The worker takes the newest checkpoint whose files have the right sha256, and cuts frames and history at its step.
-    Raises ServiceError with status 409 or 503; raises OSError.
+    The worker then takes the newest checkpoint whose files have the right hashes, and removes later frames and history
+    lines. Raises ServiceError with status 409 or 503; raises OSError.
     """
     if not any(_taken(source, folder / layout.CHECKPOINTS) for _ in range(_TRIES)):
         detail = f"the checkpoints of run {source.name} are replaced faster than they can be linked"
@@ -59,9 +61,9 @@ def fill(source: Path, folder: Path) -> None:
 
 
 def _taken(source: Path, target: Path) -> bool:
-    """Links every checkpoint with a complete manifest. Returns False if checkpoints were removed during the call,
-    because a running run keeps only its newest checkpoints. Raises ServiceError with status 409 if there is no
-    checkpoint.
+    """Makes links to every checkpoint that has a complete manifest. Returns False if checkpoints were removed
+    meanwhile: a run that is running keeps only its newest checkpoints. Raises ServiceError with status 409 if there is
+    none.
     """
     damaged: list[str] = []
     taken = 0
@@ -75,7 +77,7 @@ def _taken(source: Path, target: Path) -> bool:
             if place.is_dir():
                 damaged.append(f"{place.name}: {error}")
                 _describe(place, target / place.name)
-        except OSError:  # shutil.Error is a subclass of OSError
+        except OSError:  # shutil.Error is an OSError, too
             shutil.rmtree(target / place.name, ignore_errors=True)
             if place.is_dir():
                 raise
@@ -86,9 +88,7 @@ def _taken(source: Path, target: Path) -> bool:
 
 
 def _describe(place: Path, target: Path) -> None:
-    """Copies the two files that describe a damaged checkpoint, so that the worker can warn that the checkpoint is
-    skipped.
-    """
+    """Copies the two files that describe a damaged checkpoint, so that the worker can warn about the damage."""
     shutil.rmtree(target, ignore_errors=True)
     target.mkdir(parents=True)
     for name in (checkpoints.MANIFEST, checkpoints.SEAL):
@@ -96,7 +96,7 @@ def _describe(place: Path, target: Path) -> None:
 
 
 def _why(source: Path) -> str:
-    """Returns why the run has no checkpoint, and how the user can get a checkpoint."""
+    """Returns why the run has no checkpoint, and how the user can get one."""
     ended = outcome(source)
     if ended is not None and ended.state == State.SUCCEEDED:
         return "a run that has succeeded keeps no checkpoint"
@@ -106,7 +106,7 @@ def _why(source: Path) -> str:
 
 
 def _every(source: Path) -> str:
-    """Returns ``run.checkpoint_every`` of the case."""
+    """Returns the text of ``run.checkpoint_every`` of the case."""
     try:
         every = json.loads(whole.read(source / layout.RESOLVED_CASE))["run"]["checkpoint_every"]
     except (OSError, ValueError, KeyError, TypeError):
@@ -115,7 +115,7 @@ def _every(source: Path) -> str:
 
 
 def _link(source: str, target: str) -> None:
-    """Links a file that is only replaced as a whole; copies the list of frames."""
+    """Makes a link to a file that is never changed in place; copies the list of frames, which is."""
     if source.endswith(layout.FRAME_SERIES):
         _copy(source, target)
     else:
@@ -123,6 +123,6 @@ def _link(source: str, target: str) -> None:
 
 
 def _copy(source: str, target: str) -> None:
-    """Links a regular file; skips a missing file, a folder or a link."""
+    """Makes a link to a regular file; skips a missing file, a folder or a symbolic link."""
     with suppress(FileNotFoundError, IsADirectoryError), whole.opened(source) as file, open(target, "xb") as copy:
         shutil.copyfileobj(file, copy)

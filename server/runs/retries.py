@@ -1,4 +1,4 @@
-"""Retries of the supervisor: failed steps of runs, with the time of the next try and the reason of the failure."""
+"""Retries of the supervisor: changes of runs that have failed, with the time of the next attempt and the reason."""
 
 import errno
 import logging
@@ -9,8 +9,8 @@ from .events import Event
 
 _log = logging.getLogger("conoid.server")
 _AGAIN, _LONGEST = 1.0, 8.0
-"""Delay in s before a failed step is tried again: the first delay and the largest delay (chosen values). The delay
-doubles at each failure."""
+"""Delay in s before the next attempt: the first and the largest delay (chosen values). The delay doubles after each
+failure."""
 _QUIET = 60.0
 """Time in s for which the same error of the same run is not logged again (chosen value)."""
 _PASSING = frozenset(
@@ -18,13 +18,14 @@ _PASSING = frozenset(
      errno.EAGAIN}
 )  # fmt: skip
 _LASTING = 4.0
-"""Delay in s at which an error of a run's own files counts as permanent: after the fourth try, 7 s (chosen value)."""
+"""Delay in s from which on an error of the files of a run counts as permanent: the fourth failure, after 7 s (chosen
+value)."""
 DAMAGE = frozenset({errno.EISDIR, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.ELOOP, errno.EROFS})
-"""Errors that are permanent if they concern one folder, while other folders can be written."""
+"""Errors that are permanent if they occur in the folder of one run, while the folders of others can be written."""
 
 
 def passing(error: BaseException) -> bool:
-    """True if an error, or a cause of the error, is a temporary error of the machine, such as a full disk."""
+    """Whether the error, or a cause of it, is a temporary error of the machine, such as a full disk."""
     cause = error.__cause__ or error.__context__
     if isinstance(error, OSError) and error.errno in _PASSING:
         return True
@@ -47,8 +48,8 @@ class _Hold:
 
 
 class Retries:
-    """Failed steps and the times of their next try. The class is used in the supervisor's thread; ``why`` may be called
-    from any thread.
+    """Failed changes of runs, and the times of the next attempts. The class is used in the supervisor's thread; ``why``
+    may be called from any thread.
     """
 
     def __init__(self) -> None:
@@ -60,13 +61,13 @@ class Retries:
         return len(self._retries)
 
     def put_off(self, run_id: str, error: Exception, event: Event | None = None) -> Exception:
-        """Schedules another try of the failed step, or of the handling of ``event``, which occurs only once."""
+        """Plans another attempt at the change of a run, or at handling ``event`` if it occurs only once."""
         before = self._retries.get(run_id)
         self._hold(run_id, words(error), event or (before.event if before else None))
         return error
 
     def rest(self, run_id: str, why: str) -> None:
-        """Delays the next try to start the run."""
+        """Plans the next attempt to start a run."""
         self._hold(run_id, why, None)
 
     def _hold(self, run_id: str, why: str, event: Event | None) -> None:
@@ -78,39 +79,39 @@ class Retries:
         self._retries[run_id] = _Hold(now + delay, delay, why, event, before.logged if before and known else now)
 
     def held(self, run_id: str) -> bool:
-        """True if the next try of the run must not be made yet."""
+        """Whether the time of the next attempt has not come yet."""
         hold = self._retries.get(run_id)
         return hold is not None and hold.until > time.monotonic()
 
     def due(self) -> list[tuple[str, Event]]:
-        """Returns the events whose next try is scheduled for now or earlier."""
+        """Returns the events whose time of the next attempt has come, with their runs."""
         now = time.monotonic()
         return [(run_id, hold.event) for run_id, hold in self._retries.items() if hold.event and hold.until <= now]
 
     def timed(self) -> set[str]:
-        """Returns the runs that have a scheduled event."""
+        """Returns the runs with an event that waits for its next attempt."""
         return {run_id for run_id, hold in tuple(self._retries.items()) if hold.event is not None}
 
     def done(self, run_id: str, event: Event) -> None:
-        """Removes the failed step of a run after a successful step. A different scheduled event of the run stays."""
+        """Forgets the failure of a run after a success. Another event of the run that waits is kept."""
         hold = self._retries.get(run_id)
         if hold is not None and hold.event in (None, event):
             del self._retries[run_id]
 
     def lasts(self, run_id: str) -> bool:
-        """True if the step has failed several times."""
+        """Whether the attempts have failed several times."""
         hold = self._retries.get(run_id)
         return hold is not None and hold.delay >= _LASTING
 
     def damaged(self, run_id: str, error: Exception) -> bool:
-        """Whether the error concerns the run's own files, and is permanent."""
+        """Whether the error concerns only the files of the run, and is permanent."""
         return isinstance(error, OSError) and error.errno in DAMAGE and self.lasts(run_id)
 
     def forget(self, run_id: str) -> None:
-        """Removes a run that has ended."""
+        """Forgets a run that has ended."""
         self._retries.pop(run_id, None)
 
     def why(self, run_id: str) -> str:
-        """Returns the error of the last step; empty if the last step had no error."""
+        """Returns the reason of the last failure; empty if the last attempt has succeeded."""
         hold = self._retries.get(run_id)
         return hold.why if hold is not None else ""

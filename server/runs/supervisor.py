@@ -1,4 +1,4 @@
-"""The supervisor performs the actions that ``lifecycle`` returns. One thread processes the events of all open runs."""
+"""Supervisor: passes events to ``lifecycle`` and performs the returned actions, for all open runs in one thread."""
 
 import logging
 import queue
@@ -30,15 +30,14 @@ from .retries import Retries, words
 
 _log = logging.getLogger("conoid.server")
 _LOOK = 0.02
-"""Time in s between two checks of the running workers: the longest delay of a live event."""
+"""Time in s between two checks of the running workers, the longest delay of a message to clients."""
 _TIDY = 5.0
-"""Time in s between two checks whether the tokens have changed."""
+"""Time in s between two checks whether tokens have changed."""
 _AGAIN = 1.0
-"""Time in s between two checks while failed steps wait for their next try."""
+"""Time in s between two checks while a failed change waits for its next attempt."""
 _GONE, _DAMAGED = "the folder of the run has been removed", "the folder of the run cannot be used"
 _ANSWER = 10.0
-"""Time in s in which the supervisor's thread must answer; the thread checks 50 times a second (reason of the chosen
-value)."""
+"""Time in s within which the supervisor's thread must answer a request (chosen value)."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ class Supervisor:
         telemetry: Telemetry | None,
         ring: Callable[[str], None],
     ) -> None:
-        """Creates the supervisor without its thread; ``ring`` is called with the id of a run that has changed."""
+        """Creates the supervisor without its thread. ``ring`` gets the id of each run that changes."""
         self._settings, self._store, self._launcher = settings, store, launcher
         self._telemetry, self._ring = telemetry, ring
         self._inbox: queue.SimpleQueue[_Cancel | None] = queue.SimpleQueue()
@@ -78,20 +77,20 @@ class Supervisor:
     # From any thread --------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Reads the runs of an earlier server, then starts the supervisor's thread. Raises OSError, SQLAlchemyError."""
+        """Reads the runs of an earlier server, then starts the thread. Raises OSError, SQLAlchemyError."""
         self._launcher.tidy()
         self._take_up()
         self._waitlist.usage.begin(self._store.taken())
         self._thread.start()
 
     def close(self) -> None:
-        """Stops the supervision of runs. Workers continue, and the next server adopts the workers."""
+        """Ends the supervision of runs. The workers continue, and the next server supervises them."""
         self._leaving = True
         self._inbox.put(None)
         self._thread.join(_ANSWER)
 
     def end_all(self) -> None:
-        """Cancels every open run; returns when all runs have ended, or after twice the grace period."""
+        """Cancels every open run. Returns when all have ended, or after twice the grace period."""
         deadline = time.monotonic() + 2 * self._settings.grace
         for run_id in tuple(self._open):
             self._inbox.put(_Cancel(run_id, Future()))
@@ -100,11 +99,11 @@ class Supervisor:
 
     @property
     def alive(self) -> bool:
-        """False if the supervisor's thread has ended, so that runs are not supervised."""
+        """Whether the thread runs; otherwise no run is supervised."""
         return self._thread.is_alive()
 
     def admit(self, run: Run) -> None:
-        """Adds a new run, which is already on disk and in the database."""
+        """Adds a new run, which must already be on disk and in the database."""
         self._open[run.id] = run
         self._waitlist.changed()
         self._inbox.put(None)
@@ -120,7 +119,7 @@ class Supervisor:
         return self._open.get(run_id)
 
     def is_open(self, run_id: str) -> bool:
-        """False if the run has ended and its last line is in the journal."""
+        """Whether the run has not ended, or its last line is not in the journal yet."""
         run = self._open.get(run_id)
         return run is not None and not run.state.final
 
@@ -130,11 +129,11 @@ class Supervisor:
         return None if watch is None else watch.progress
 
     def slots_used(self) -> int:
-        """Returns the cores in use by runs."""
+        """Returns the number of cores in use by runs."""
         return sum(run.cores for run_id in tuple(self._watches) if (run := self._open.get(run_id)))
 
     def reason(self, run_id: str) -> str:
-        """Returns why a queued run waits, or the message of a batch system; empty for other runs."""
+        """Returns why a waiting run waits, or the remark of a batch system; empty for other runs."""
         if why := self._retries.why(run_id):
             return f"tried again soon: {why}"
         watch = self._watches.get(run_id)
@@ -143,12 +142,12 @@ class Supervisor:
         return self._waitlist.why(run_id)
 
     def taken(self, owner: str) -> tuple[int, float]:
-        """Returns the number of an owner's runs with cores or in a batch system, and the decayed core-seconds."""
+        """Returns an owner's number of runs with cores or in a batch system, and used core-seconds, reduced by age."""
         own = [run for run in tuple(self._open.values()) if run.owner == owner]
         return sum(run.id in self._watches for run in own), self._waitlist.used(owner, own)
 
     def stranded(self) -> list[str]:
-        """Returns open runs without watch, queue entry and timer; each such run is an error of the server."""
+        """Returns the open runs without supervision, place in the queue or planned attempt; each one is an error."""
         looked_after = {*self._watches, *self._index.unsaved, *self._retries.timed()}
         return scheduling.stranded(tuple(self._open.values()), looked_after)
 
@@ -176,7 +175,7 @@ class Supervisor:
             self._tidy()
 
     def _answer(self) -> None:
-        """Processes the requests of other threads until the time of the next check."""
+        """Handles the requests of other threads until the time of the next check."""
         try:
             asked = self._inbox.get(timeout=_LOOK if self._watches else _AGAIN if self._retries else _TIDY)
         except queue.Empty:
@@ -198,7 +197,7 @@ class Supervisor:
             self._ring(run_id)
 
     def _grant(self) -> None:
-        """Starts the runs that the queue selects; a failed start of a run delays no other run."""
+        """Starts the runs that the queue selects; a failed start delays no other run."""
         held = Held(self._retries.held, self.held_back)
         for run_id in self._waitlist.turn(tuple(self._open.values()), tuple(self._watches), held):
             try:
@@ -209,11 +208,11 @@ class Supervisor:
                 self._apply(run_id, Granted(self._batch))
 
     def _apply(self, run_id: str, event: Event) -> Exception | None:
-        """Makes one step of a run; returns the error that prevented the step, or None.
+        """Changes a run by an event; returns the error if this fails, otherwise None.
 
-        A step that fails, for example because of a full disk, changes nothing and is tried again. A queued run is
-        selected again, the end of a worker is detected again, and an event that occurs only once waits in ``retries``.
-        The next try finds the data that the first try wrote, so that nothing is done twice.
+        If it fails, for example because of a full disk, the run stays as it was and the change is tried again: a
+        waiting run is selected again, the end of a worker is detected again, and an event that occurs only once waits
+        in ``retries``. The next attempt uses what the first attempt has written, so that nothing is done twice.
         """
         before = self._open.get(run_id)
         if before is None:
@@ -237,7 +236,9 @@ class Supervisor:
         return None
 
     def _fail(self, run: Run, event: Event | None, error: Exception) -> Exception | None:
-        """Handles a failed step. A run without a usable folder has ended; for any other run the step is tried again."""
+        """Handles a failed change. If the folder of the run cannot be used, the run ends; otherwise the change is tried
+        again later.
+        """
         if not isinstance(event, Broken):
             if (hands := self._hands).gone(run.id):
                 return self._apply(run.id, Broken(_GONE))
@@ -247,7 +248,7 @@ class Supervisor:
         return self._retries.put_off(run.id, error, event if isinstance(event, ONCE) else None)
 
     def _settle(self, run: Run) -> None:
-        """Completes a step: updates first the memory, then the database, then wakes the waiters for a change."""
+        """Completes a change: stores the run in memory, then in the database, then wakes the listeners of the run."""
         self._waitlist.settled(self._open.get(run.id), run)
         self._open[run.id] = run
         if run.state.final:
@@ -263,7 +264,7 @@ class Supervisor:
     # Housekeeping -----------------------------------------------------------------------------------------------------
 
     def _tidy(self) -> None:
-        """Repeats failed steps, and gives the present tokens to the Zenoh router."""
+        """Repeats failed changes, and gives new tokens to the Zenoh router."""
         self._tidied = time.monotonic()
         self._earlier_runs.again()
         for run_id in tuple(self._index.unsaved):
@@ -281,7 +282,7 @@ class Supervisor:
                 _log.error("the router does not have the newest tokens: %s", error)
 
     def _take_up(self) -> None:
-        """Updates memory and database from the runs' folders, and continues the runs of an earlier server."""
+        """Reads the folders of all runs into memory and database, and continues the runs of an earlier server."""
         self._earlier_runs.all()
         for run_id, run in self._store.open().items():
             if run_id not in self._open and self._hands.gone(run_id):
@@ -289,7 +290,7 @@ class Supervisor:
                 self._apply(run_id, Broken(_GONE))
 
     def _found(self, left: Left) -> None:
-        """Adds a run of an earlier server. An ended run is kept in memory until the database has the end of the run."""
+        """Adds a run of an earlier server. A run that has ended stays in memory until the database has its end."""
         if left.worker is not None:
             self._hands.found[left.run.id] = left.worker
         if not left.run.state.final or left.run.id in self._index.unsaved:

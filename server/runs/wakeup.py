@@ -1,5 +1,5 @@
-"""Wake-up of coroutines that wait for a change of a run. A wake-up carries no data: the coroutine reads the run's files
-again.
+"""Wake-up of coroutines that wait for a change of a run. A wake-up has no data: the coroutine then reads the files of
+the run.
 """
 
 import asyncio
@@ -8,24 +8,24 @@ from contextlib import contextmanager
 
 
 class Listener:
-    """A waiter for changes of a run. Call ``clear``, read the files, and call ``wait`` if the files contain nothing
-    new. In this order no change of the files can be missed.
+    """Waits for changes of a run. Call ``clear``, read the files, and call ``wait`` if the files contain nothing new.
+    In this order no change of the files can be missed.
     """
 
     def __init__(self) -> None:
         self._rung = asyncio.Event()
 
     def clear(self) -> None:
-        """Clears the event of the waiter."""
+        """Resets the event of the listener."""
         self._rung.clear()
 
     def ring(self) -> None:
-        """Sets the event of the waiter; called in the thread of the event loop."""
+        """Sets the event of the listener; called in the thread of the event loop."""
         self._rung.set()
 
     async def wait(self, timeout: float) -> bool:
-        """Waits for the event. Returns True if the event was set since ``clear``, and False after ``timeout`` seconds
-        without an event.
+        """Waits for the event. Returns True if the event was set since ``clear``, False if ``timeout`` seconds have
+        passed.
         """
         try:
             await asyncio.wait_for(self._rung.wait(), timeout)
@@ -35,7 +35,7 @@ class Listener:
 
 
 class Wakeups:
-    """The waiters of all runs."""
+    """The listeners of all runs."""
 
     def __init__(self) -> None:
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -43,11 +43,11 @@ class Wakeups:
         self.closed = False
 
     def attach(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Sets the event loop of the waiters."""
+        """Sets the event loop in which the listeners wait."""
         self._loop = loop
 
     def ring(self, run_id: str) -> None:
-        """Wakes all waiters of a run; called from any thread."""
+        """Wakes all listeners of a run; may be called from any thread."""
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._ring, run_id)
 
@@ -56,8 +56,8 @@ class Wakeups:
             listener.ring()
 
     def close(self) -> None:
-        """Wakes all waiters for the last time; the waiters end when they read ``closed``. The method is called in the
-        thread of the event loop.
+        """Wakes all listeners for the last time; they end because ``closed`` is set. The method is called in the thread
+        of the event loop.
         """
         self.closed = True
         for run_id in self._listeners:
@@ -65,12 +65,14 @@ class Wakeups:
 
     @property
     def listening(self) -> int:
-        """Number of present waiters."""
+        """Number of listeners at present."""
         return sum(len(listeners) for listeners in self._listeners.values())
 
     @contextmanager
     def listen(self, run_id: str) -> Iterator[Listener]:
-        """Registers a waiter while the ``with`` block runs. The method is called in the thread of the event loop."""
+        """Registers a listener for the time of the ``with`` block. The method is called in the thread of the event
+        loop.
+        """
         listener = Listener()
         self._listeners.setdefault(run_id, set()).add(listener)
         try:

@@ -1,4 +1,4 @@
-"""Supervision of one worker: journal, process and time limits."""
+"""Supervision of one worker: its journal, its process and its limits."""
 
 import time
 from collections.abc import Iterator
@@ -17,13 +17,13 @@ from . import ends, folder, journal, launcher_log
 from .events import Event, GraceOver, OutputOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
 
 _FAREWELL = 10.0
-"""Time in s in which a worker must exit after its last message. The launcher of a run may hang if one of its auxiliary
+"""Time in s within which a worker must exit after its last message. The launcher may hang if one of its helper
 processes was killed."""
 _PATIENCE = 1.0
-"""Time in s between two checks of a worker in the queue of a batch system, because there may be a thousand such workers
-(chosen value)."""
+"""Time in s between two checks of a worker in the queue of a batch system (chosen value); there may be a thousand such
+workers."""
 _WEIGHED = 5.0
-"""Time in s between two measurements of the size of a run's folder; measuring some hundred files takes milliseconds
+"""Time in s between two measurements of the size of a run's folder; one takes milliseconds for some hundred files
 (reason of the chosen value)."""
 
 _progress = msgspec.json.Decoder(Progress)
@@ -31,11 +31,11 @@ _status = msgspec.json.Decoder(Status)
 
 
 class Watch:
-    """Checks a worker a few dozen times a second, and returns the changes of the worker as events."""
+    """Checks a worker some tens of times a second, and returns its changes as events."""
 
     def __init__(self, run_folder: Path, worker: Worker, left: float | None, most: int | None = None) -> None:
-        """Creates the watch of a worker. ``left``: remaining wall time of the run in s, measured by the monotonic
-        clock; ``most``: largest size of the run's folder in bytes.
+        """Creates the watch of a worker. ``left``: remaining wall time of the run, s; ``most``: largest size of the
+        run's folder, bytes.
         """
         self._most, self._weigh_at = most, time.monotonic() + _WEIGHED
         self.worker, self._folder = worker, run_folder
@@ -46,11 +46,11 @@ class Watch:
         self._next, self._full = 0.0, False
         self.progress: Progress | None = None
         self.news = False
-        """True if the last check found new lines in the journal."""
+        """Whether the last check has found new lines in the journal."""
 
     def look(self) -> Iterator[Event]:
         """Returns the events since the last check of the worker. If the disk was full when the worker ended, the end
-        counts as an error of the disk, even if the end is reported later. Raises OSError if files of the run cannot be
+        counts as an error of the disk, also if the end is handled later. Raises OSError if files of the run cannot be
         read.
         """
         now = time.monotonic()
@@ -82,7 +82,7 @@ class Watch:
                 yield OutputOver()
 
     def _turn(self) -> Iterator[Event]:
-        """Yields an event if the worker has received its cores, or waits for cores again."""
+        """Yields an event if the worker has got its cores, or waits for cores again."""
         phase, before = self.worker.phase(), self._phase
         self._phase = phase
         if phase == "waits":
@@ -91,7 +91,7 @@ class Watch:
             yield WorkerWaits() if phase == "waits" else WorkerStarts(self.worker.began())
 
     def stop(self, grace: float) -> None:
-        """Requests the worker to stop, and sets the time at which the server kills the worker."""
+        """Asks the worker to stop, and sets the time at which the server kills it."""
         self.worker.stop()
         self._kill_at = min(self._kill_at, time.monotonic() + grace)
 
@@ -100,7 +100,7 @@ class Watch:
         return f"{layout.OUTCOME}: {wrong}" if wrong else f"its last words: {last_words}" if last_words else ""
 
     def _read(self, now: float) -> bool:
-        """Reads new lines of the journal. Returns True if one of the new lines reports that the worker runs."""
+        """Reads the new lines of the journal. Returns whether one of them reports that the worker runs."""
         runs, self.news = False, False
         while lines := self._tail.read():
             self.news = True

@@ -8,14 +8,14 @@ from .problems import ProblemEntry
 
 
 class NamedFile(msgspec.Struct, kw_only=True):
-    """A file that a case names, and the sha256 of its content."""
+    """A file that a case names, with its SHA-256 hash."""
 
     path: str
     sha256: str
 
 
 class CaseFile(msgspec.Struct, kw_only=True):
-    """A file that a case names in the table ``key``; ``sha256`` is empty if the case gives no hash."""
+    """A file that the table ``key`` of a case names; ``sha256`` is empty if the case gives no hash."""
 
     key: str
     path: str

@@ -19,7 +19,7 @@ class Files(msgspec.Struct, kw_only=True):
 
 
 class SentFile(msgspec.Struct, kw_only=True):
-    """An uploaded file of a user: ``offset`` bytes of ``size`` bytes have arrived. ``asked``: Unix time of the last
+    """A file that a user uploads: ``offset`` of its ``size`` bytes have arrived. ``asked``: Unix time of the last
     request for the file, s.
     """
 

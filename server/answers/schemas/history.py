@@ -49,7 +49,8 @@ class History(msgspec.Struct, kw_only=True):
     balance: list[dict[str, Any]]
     snapshots: list[dict[str, Any]]
     log: list[dict[str, Any]]
-    """Messages of the log, of states and of checkpoints; of a long log only the first and the last messages."""
+    """Messages for the log of the run: log lines, states and checkpoints. Of a long log, only the first and the last
+    messages."""
     log_left_out: int
     """Number of log messages that ``log`` leaves out."""
     warnings: list[dict[str, Any]]

@@ -1,4 +1,4 @@
-"""JSON schemas of refused requests; an error has one line of text for people and a code for programs."""
+"""JSON schemas of refused requests. Each error has a text of one line for users and a code for programs."""
 
 from typing import Any
 
@@ -15,7 +15,9 @@ class ProblemEntry(msgspec.Struct, kw_only=True):
 
 
 class Problem(msgspec.Struct, kw_only=True, omit_defaults=True):
-    """Refusal of a request (RFC 9457): ``detail`` is one line for people, ``code`` a constant word for programs."""
+    """Refusal of a request (RFC 9457): ``detail`` is a text of one line for users, ``code`` a fixed word for
+    programs.
+    """
 
     type: str
     title: str
@@ -27,4 +29,4 @@ class Problem(msgspec.Struct, kw_only=True, omit_defaults=True):
     hint: str = ""
     errors: list[ProblemEntry] = []
     outcome: dict[str, Any] = {}
-    """The record that is kept of a removed run."""
+    """Record that the server keeps of a run that was removed."""

@@ -10,8 +10,8 @@ from .cases import NamedFile
 
 
 class Receipt(msgspec.Struct, kw_only=True):
-    """Answer to a submission. The estimate of a run has the fields elements, nodes, dt, steps, memory_bytes and
-    core_seconds; the field seconds, the wall time, is optional.
+    """Answer to a submission. The estimate has the fields elements, nodes, dt, steps, memory_bytes and core_seconds,
+    and sometimes seconds, the wall time.
     """
 
     id: str
@@ -29,7 +29,7 @@ class Receipt(msgspec.Struct, kw_only=True):
 
 
 class RunLine(msgspec.Struct, kw_only=True):
-    """A run in a list. Times are Unix times in s; a time is null before its event."""
+    """A run in a list. Times are Unix times in s; the time of an event that has not happened is null."""
 
     id: str
     owner: str

@@ -13,7 +13,7 @@ class ZenohAccess(msgspec.Struct, kw_only=True):
 
 
 class Slots(msgspec.Struct, kw_only=True):
-    """Number of cores that runs of this server may use, and number of cores in use now."""
+    """Number of cores that the runs of this server may use, and number of cores in use."""
 
     total: int
     used: int

@@ -36,9 +36,9 @@ class SweepLine(msgspec.Struct, kw_only=True):
     removed: int
     url: str
     search: Search | None
-    """Last report of an adaptive sweep, unchanged from its client."""
+    """Last report of an adaptive sweep, as its client sent it."""
     reported: float | None
-    """Time of the last report of an adaptive sweep, Unix s."""
+    """Unix time of the last report of an adaptive sweep, s."""
 
 
 class Reported(msgspec.Struct, kw_only=True):

@@ -8,8 +8,8 @@ from .runs import ListedRun
 
 
 class TableRow(ListedRun, kw_only=True):
-    """A run in the table: index of its group of similar cases, case values that differ from the common values of the
-    group, and results.
+    """A run in the table: the index of its group of similar cases, the values in which its case differs from the group,
+    and its results.
     """
 
     progress: Progress | None
@@ -17,7 +17,7 @@ class TableRow(ListedRun, kw_only=True):
     values: dict[str, bool | int | float | str | None]
     results: list[float | None] | None
     references: int
-    """Number of reference values with which the run was compared."""
+    """Number of reference values with which the results of the run were compared."""
     missed: list[str]
     """Names of the reference values from which the results of the run differ by more than the tolerance."""
 
@@ -41,7 +41,7 @@ class AlikeCases(msgspec.Struct, kw_only=True):
 
 class Table(msgspec.Struct, kw_only=True):
     """Runs, newest first, and the cursor of the next page; the cursor is null on the last page. ``pending``: number of
-    runs whose case values and results have not been read yet.
+    runs of this page whose values and results have not been read yet.
     """
 
     runs: list[TableRow]
