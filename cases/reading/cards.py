@@ -8,11 +8,12 @@ behind a keyword). Every width below 10 becomes 10 in the format I10 (``*KEYWORD
 """
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
+from . import parameters
 from .included import Included, lines
 from .problems import ConoidError, shown
 
@@ -26,7 +27,6 @@ _REMARK = re.compile(r"\(.*\)")
 _SETTING = re.compile(r"(LONG|I10)\s*=\s*([A-Za-z])", re.ASCII | re.IGNORECASE)
 _WHOLE = re.compile(r"[+-]?[0-9]{1,18}(\.0*)?", re.ASCII)
 _REAL = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?:[eEdD]([+-]?[0-9]{1,4})|([+-][0-9]{1,4}))?", re.ASCII)
-_PARAMETER = re.compile(r"([IiRrCc])\s*([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
 
 
 class CardError(ConoidError, ValueError):
@@ -57,8 +57,8 @@ class Block:
     """Smallest width of a field: 0, 10 or 20 characters."""
     remark: str = ""
     """Text in brackets behind the keyword, such as ``ten nodes format``."""
-    parameters: Mapping[str, str] = field(default_factory=dict)
-    """Values of the parameters defined by ``*PARAMETER``, by name in lower case."""
+    values: parameters.Values = field(default_factory=dict)
+    """The parameters that the deck defines above this keyword."""
 
     def filled(self) -> Iterator[Card]:
         """The cards of the keyword that are not empty."""
@@ -89,7 +89,7 @@ class Block:
         Raises CardError if the card has more fields than ``widths``, or if a parameter is not defined.
         """
         found = self._between_commas(card, widths) if "," in card.text else self._cut(card, widths)
-        return [self._valued(card, item) for item in found] if "&" in card.text else found
+        return [self._valued(card, item) for item in found] if "&" in card.text or "<" in card.text else found
 
     def whole(self, card: Card, item: str, what: str) -> int:
         """Returns the whole number in a field; 0 for an empty field. Raises CardError if the field is not a whole
@@ -133,14 +133,12 @@ class Block:
         return found + [""] * (len(widths) - len(found))
 
     def _valued(self, card: Card, item: str) -> str:
-        sign, mark, name = item.partition("&")
-        if not mark:
+        if "&" not in item and not item.startswith("<"):
             return item
-        value = self.parameters.get(name.strip().lower())
-        if value is None or sign not in ("", "-", "+"):
-            known = ", ".join(self.parameters) or "none"
-            raise self.error(card, f"the parameter {shown(item)} is not defined above; known: {known}")
-        return value if sign in ("", "+") else value[1:] if value[0] == "-" else f"-{value.lstrip('+')}"
+        try:
+            return parameters.valued(item, self.values)
+        except ValueError as error:
+            raise self.error(card, str(error)) from None
 
 
 def _crossed(card: Card) -> str:
@@ -163,7 +161,7 @@ class Deck:
         self.followed: list[Block] = []
         """Keywords that ``blocks`` has processed itself and does not yield: ``*COMMENT``, ``*INCLUDE``, ``*PARAMETER``
         and ``*END``."""
-        self._parameters: dict[str, str] = {}
+        self._parameters: parameters.Values = {}
 
     def blocks(self) -> Iterator[Block]:
         """Yields every keyword of the deck up to ``*END`` in the order of the deck, except ``*COMMENT``, ``*INCLUDE``
@@ -174,7 +172,8 @@ class Deck:
 
     def _of(self, path: Path, file: str, least: int) -> Iterator[Block]:
         for block in self._plain(path, file, least):
-            if block.name in ("COMMENT", "INCLUDE", "PARAMETER", "PARAMETER_GLOBAL"):
+            word, _, options = block.name.partition("_")
+            if block.name in ("COMMENT", "INCLUDE") or word == "PARAMETER":
                 self.followed.append(block)
             if block.name == "INCLUDE":
                 for name, number in _names(block):
@@ -184,9 +183,9 @@ class Deck:
                         raise CardError(f"{block.place(number)}: {error}") from None
                     yield from self._of(entered, name, block.least)
                     self.included.leave()
-            elif block.name in ("PARAMETER", "PARAMETER_GLOBAL"):
-                self._define(block)
-            elif block.name.startswith(("INCLUDE_", "PARAMETER_")):
+            elif word == "PARAMETER" and parameters.OPTIONS.issuperset(options.split("_") if options else ()):
+                self._define(block, frozenset(options.split("_")))
+            elif word in ("INCLUDE", "PARAMETER"):
                 raise block.error(None, f"*{block.name} is not supported; write its contents into the deck")
             elif block.name != "COMMENT":
                 yield block
@@ -225,18 +224,26 @@ class Deck:
             raise block.error(None, f"{shown(rest)} is behind *{name}")
         return block
 
-    def _define(self, block: Block) -> None:
-        for card in block.filled():
-            items = block.fields(card, *(10,) * 8)
-            for name, value in zip(items[::2], items[1::2], strict=True):
-                if not name and not value:
-                    continue
-                found = _PARAMETER.fullmatch(name)
-                if found is None or not value:
-                    raise block.error(card, f"{shown(name)} with the value {shown(value)} defines no parameter")
-                key = found[2].lower()
-                if self._parameters.setdefault(key, value) != value:
-                    raise block.error(card, f"the parameter {shown(key)} has another value above")
+    def _define(self, block: Block, options: frozenset[str]) -> None:
+        if "DUPLICATION" in options:
+            return
+        computed = "EXPRESSION" in options
+        for card, name, text in _computed(block) if computed else _plain(block, options):
+            try:
+                self._parameters = parameters.defined(self._parameters, name, text, computed=computed)
+            except ValueError as error:
+                raise block.error(card, str(error)) from None
+
+
+def _computed(block: Block) -> Iterator[tuple[Card, str, str]]:
+    found = parameters.expressions([card.text for card in block.cards], block.least)
+    return ((block.cards[index], name, text) for index, name, text in found)
+
+
+def _plain(block: Block, options: frozenset[str]) -> Iterator[tuple[Card, str, str]]:
+    for card in block.filled():
+        for name, value in parameters.pairs(block.fields(card, *(10,) * 8), options):
+            yield card, name, value
 
 
 def _formatted(block: Block, rest: str) -> Block:

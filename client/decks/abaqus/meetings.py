@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Sequence
 
-from conoid.cases.reading.inp import InpError
+from conoid.cases.reading.inp import InpError, numbers
 
 from ..account import Entry
+from ..bonds import MOVED, Tie
 from ..contacts import Meeting
 from ..draft import Body
 from .keyword import Keyword, joined
@@ -20,7 +21,7 @@ class Meetings:
         InpError.
         """
         self.made: list[Meeting] = []
-        self.ties: list[tuple[tuple[str, str], Entry]] = []
+        self.ties: list[Tie] = []
         self._every = frozenset(body.key for body in bodies)
         self._surface = surface
         self._frictions = self._interactions(keywords)
@@ -129,10 +130,11 @@ class Meetings:
             self.made.append(Meeting(one, other, friction, each.entry))
 
     def _tie(self, each: Keyword) -> None:
-        each.forgive(
-            "NAME, ADJUST, POSITION TOLERANCE, TYPE, NO ROTATION", "setting with which Abaqus finds the tied nodes"
-        )
+        gap = numbers(each.line, each.get("POSITION TOLERANCE") or "0")[0]
+        if (each.get("ADJUST") or "").upper() == "NO":
+            each.entry.remark("differs", "ADJUST=NO", MOVED)
+        each.forgive("NAME, ADJUST, TYPE, NO ROTATION", "setting with which Abaqus finds the tied nodes")
         each.rest()
         for _, items in each.lists():
             pairs = Meeting(self._surface(items[0], each.entry), self._surface(items[1], each.entry), 0.0, each.entry)
-            self.ties += [(pair, each.entry) for pair in sorted(pairs.pairs())]
+            self.ties += [Tie(pair, each.entry, gap) for pair in sorted(pairs.pairs())]

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from conoid.cases.reading.cards import Block, Card
 
 from ..account import Entry
+from ..bonds import MOVED, Tie
 from ..contacts import Meeting
 from ..draft import Draft
 from ..units import TIME
@@ -18,6 +19,8 @@ DOUBLE = frozenset({
     "CONTACT_AUTOMATIC_ONE_WAY_SURFACE_TO_SURFACE", "CONTACT_ONE_WAY_SURFACE_TO_SURFACE",
 })  # fmt: skip
 TIED = frozenset({"CONTACT_TIED_SURFACE_TO_SURFACE", "CONTACT_TIED_NODES_TO_SURFACE"})
+OFFSETS = frozenset({"OFFSET", "CONSTRAINED", "BEAM"})
+"""Words behind the name of a tied contact that keeps the distance between its surfaces."""
 OPTIONS = frozenset({"ID", "TITLE", "MPP"})
 _LAYOUT = (
     "SSID MSID SSTYP MSTYP SBOXID MBOXID SPR MPR", "FS FD DC VC VDC PENCHK BT DT", "SFS SFM SST MST SFST SFMT FSF VSF",
@@ -59,14 +62,29 @@ def contact(block: Block, name: str, options: frozenset[str], entry: Entry, surf
     return Meeting(one, other, max(still, 0.0), entry)
 
 
-def _behind(block: Block, options: frozenset[str], entry: Entry) -> list[Card]:
+def tied(block: Block, name: str, options: frozenset[str], entry: Entry, surface: Surface) -> list[Tie]:
+    """Reads a tied contact. Raises ValueError."""
+    found = contact(block, name, options - OFFSETS, entry, surface)
+    fields = Fields(block, entry, _behind(block, options, None), _LAYOUT)
+    thickness = [fields.real("SST"), fields.real("MST")]
+    gap = 3.0 * sum(map(abs, thickness)) / 5.0 if min(thickness) < 0.0 else 0.0
+    if gap:
+        what = f"SST = {thickness[0]:g}, MST = {thickness[1]:g}"
+        entry.remark("differs", what, "the largest distance of tied nodes, 0.6 (|SST| + |MST|), is bond.gap")
+    if options & OFFSETS:
+        entry.remark("differs", "OFFSET", MOVED)
+    return [Tie(pair, entry, gap) for pair in sorted(found.pairs())]
+
+
+def _behind(block: Block, options: frozenset[str], entry: Entry | None) -> list[Card]:
     """Returns the cards after the title and after the cards of the option MPP. This option has one card, and a
     second card if the next card begins with ``&``.
     """
     cards = trimmed(block.cards)[bool(options & {"ID", "TITLE"}) :]
     if "MPP" not in options or not cards:
         return cards
-    entry.remark("left", f"line {cards[0].number}", "setting of the parallel contact search of LS-DYNA")
+    if entry is not None:
+        entry.remark("left", f"line {cards[0].number}", "setting of the parallel contact search of LS-DYNA")
     return cards[1 + (len(cards) > 1 and cards[1].text.lstrip().startswith("&")) :]
 
 

@@ -227,9 +227,8 @@ class LsDyna:
         base, options = block.parted(control.OPTIONS)
         if base in control.SINGLE | control.DOUBLE:
             self._meetings.append(control.contact(block, base, options, entry, self._numbered.surface))
-        elif base in control.TIED:
-            tied = control.contact(block, base, options, entry, self._numbered.surface)
-            self._ties += [(pair, entry) for pair in sorted(tied.pairs())]
+        elif (tied := block.parted(control.OPTIONS | control.OFFSETS))[0] in control.TIED:
+            self._ties += control.tied(block, *tied, entry, self._numbered.surface)
         elif name == "CONTROL_TIMESTEP":
             control.time_step(self._draft, block, entry)
         elif name == "DATABASE_BINARY_D3PLOT":

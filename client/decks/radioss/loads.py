@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from ..account import Entry
+from ..bonds import MOVED
 from ..contacts import Meeting
 from ..holds import Course, Hold, displacement_speed, velocity_course
 from ..start import Start
@@ -165,7 +166,7 @@ def contact(option: Option, entry: Entry, surface: Surface) -> Meeting:
     kind = option.words[1]
     fields = Fields(option, entry, option.rows[1:], _LAYOUTS[kind])
     if kind == "TYPE2":
-        fields.forgive("IGNORE SPOTFLAG LEVEL ISEARCH IDEL DSEARCH", "setting with which Radioss ties nodes")
+        fields.forgive("IGNORE SPOTFLAG LEVEL ISEARCH IDEL", "setting with which Radioss ties nodes")
         fields.extra.clear()
         return _meeting(fields, surface, ("GRNOD", "SURF"), 0.0)
     fields.refuse(
@@ -175,6 +176,13 @@ def contact(option: Option, entry: Entry, surface: Surface) -> Meeting:
     friction = fields.real("FRIC")
     fields.rest("left", _PENALTY)
     return _meeting(fields, surface, names, friction)
+
+
+def tied_distance(option: Option, entry: Entry) -> float:
+    """Returns the largest distance of nodes that ``/INTER/TYPE2`` ties; 0 if the deck does not give it."""
+    distance = Fields(option, entry, option.rows[1:], _LAYOUTS["TYPE2"]).real("DSEARCH")
+    entry.remark("differs", "TYPE2", MOVED)
+    return distance
 
 
 def _meeting(fields: Fields, surface: Surface, names: tuple[str, ...], friction: float) -> Meeting:

@@ -236,7 +236,7 @@ class Radioss:
                     entry.refuse(str(error))
                     continue
                 if option.words[1] == "TYPE2":
-                    ties += [(pair, entry) for pair in sorted(made.pairs())]
+                    ties += [Tie(pair, entry, loads.tied_distance(option, entry)) for pair in sorted(made.pairs())]
                 else:
                     meetings.append(made)
         join(draft, self._topology, self._bodies, ties)
