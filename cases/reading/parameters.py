@@ -18,6 +18,7 @@ _COMMA = re.compile(r"\s*([IiRrCc]\s*[A-Za-z_][A-Za-z0-9_]*)\s*,(.*)", re.ASCII)
 _USE = re.compile(r"([+-]?)&\s*([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
 _REAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][+-]?[0-9]{1,4}|[+-][0-9]{1,4})?", re.ASCII)
 _NAME_WIDTH = 10
+"""Number of columns of the name before an expression (the manual, *PARAMETER_EXPRESSION)."""
 
 
 def pairs(items: Sequence[str], options: frozenset[str]) -> Iterator[tuple[str, str]]:

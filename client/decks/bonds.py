@@ -28,9 +28,11 @@ def join(draft: Draft, topology: Topology, bodies: Sequence[Body], ties: Iterabl
     """Adds a ``[[bond]]`` for each pair of joined bodies."""
     names = {body.key: body.name for body in bodies}
     shared = topology.joined() if len(bodies) > 1 else []
+    rigid = {key for key, _ in draft.rigid_parts()}
     for one, other in shared:
-        draft.bonds.append({"kind": "shared", "parts": [names[one], names[other]]})
-        draft.account.remarks.append(f'{names[one]} and {names[other]} share nodes: [[bond]] kind = "shared"')
+        kind = "shared" if rigid.isdisjoint((one, other)) else "tied"
+        draft.bonds.append({"kind": kind, "parts": [names[one], names[other]]})
+        draft.account.remarks.append(f'{names[one]} and {names[other]} share nodes: [[bond]] kind = "{kind}"')
     places: dict[tuple[str, str], int] = {}
     for tie in ties:
         one, other = tie.pair

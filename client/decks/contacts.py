@@ -48,7 +48,8 @@ def meet(draft: Draft, bodies: Sequence[Body], meetings: Sequence[Meeting]) -> N
     table: dict[str, Any] = {}
     if len(inside) < len(bodies):
         table["parts"] = [body.name for body in inside]
-    alone = {key for each in meetings if each.other is None for key in each.one}
+    rigid = {key for key, _ in draft.rigid_parts()}
+    alone = {key for each in meetings if each.other is None for key in each.one} - rigid
     if alone:
         table["self_contact"] = [body.name for body in bodies if body.key in alone]
     common = Counter(met.values()).most_common(1)[0][0] if met else meetings[0].friction

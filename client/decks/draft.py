@@ -126,10 +126,13 @@ class Draft:
         temperature = made.temperature if body.temperature is None else body.temperature
         if temperature is not None:
             part["temperature"] = temperature
+        erosion = {**made.erosion, **body.erosion}
         if made.rigid or body.rigid:
             part["rigid"] = True
             self._rigid.append((body.key, body.name))
-        if erosion := {**made.erosion, **body.erosion}:
+            if erosion:
+                body.entry.remark("left", "failure of the material", "a rigid part has no strain")
+        elif erosion:
             part["erosion"] = erosion
         body.entry.take(f"parts[{len(self.parts)}]")
         self.parts.append(part)

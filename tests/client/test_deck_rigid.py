@@ -13,6 +13,39 @@ BODY = "*Density\n7.85e-9,\n*Elastic\n2.1e5, 0.3"
 REFERENCE = "*Node, nset=REF\n99, 0.3, 0.3, 0.3\n*Rigid Body, ref node=REF, elset=body\n"
 
 
+RIGID = ("*MAT_RIGID", row(2, "7.85E-9", 2.1e5, 0.3), "*PART", "punch", row(2, 1, 2))
+APART = ("*NODE", "\n".join(f"{i:8}{x:16.3f}{y:16.3f}{z:16.3f}" for i, x, y, z in (
+    (11, 0, 0, 0), (12, 1, 0, 0), (13, 0, 1, 0), (14, 0, 0, -1),
+)), "*ELEMENT_SOLID", "".join(f"{n:8}" for n in (2, 2, 11, 13, 12, 14, 14, 14, 14, 14)))  # fmt: skip
+SHARED = (
+    "*NODE", f"{14:8}{0.0:16.3f}{0.0:16.3f}{-1.0:16.3f}", "*ELEMENT_SOLID",
+    "".join(f"{n:8}" for n in (2, 2, 1, 3, 2, 14, 14, 14, 14, 14)),
+)  # fmt: skip
+
+
+def test_a_rigid_body_in_a_contact_of_one_surface_has_no_self_contact(tmp_path: Path) -> None:
+    contact = ("*CONTACT_AUTOMATIC_SINGLE_SURFACE", row(0, 0, 5), row(0.2), row(0))
+    found = read(tmp_path, "a.k", lsdyna(*STEEL, *RIGID, *APART, *contact))
+    assert found.refusals == []
+    assert found.data["contact"] == {"self_contact": ["body"], "friction": 0.2}
+
+
+def test_a_rigid_body_that_shares_nodes_is_tied(tmp_path: Path) -> None:
+    erosion = ("*MAT_PLASTIC_KINEMATIC", row(1, "7.85E-9", 2.1e5, 0.3, 300.0), row(0, 0, 0.4))
+    found = read(tmp_path, "a.k", lsdyna(*erosion, *RIGID, *SHARED))
+    assert found.refusals == []
+    assert found.data["bond"] == [{"kind": "tied", "parts": ["body", "punch"]}]
+
+
+def test_a_rigid_body_of_a_material_that_fails_does_not_erode(tmp_path: Path) -> None:
+    fails = "*Shear Failure\n0.4\n"
+    found = read(tmp_path, "a.inp", abaqus(f"{BODY}\n*Plastic\n300.\n{fails}", model=REFERENCE))
+    assert found.refusals == []
+    (part,) = found.data["parts"]
+    assert part["rigid"] is True
+    assert "erosion" not in part
+
+
 def turning(found: Imported) -> list[str]:
     """Returns the remarks about the rotation of rigid bodies."""
     return [each.why for entry in found.account.entries for each in entry.details if each.what == "rotation"]

@@ -187,6 +187,13 @@ REFUSED = {
         "the curve ends at 0.001, before the end of the run at 0.01",
     ),
     "shells": ((*STEEL, "*ELEMENT_SHELL", row(9, 2)), "ELEMENT_SHELL: shells"),
+    "a thermal analysis": ((*STEEL, "*CONTROL_SOLUTION", row(2)), "SOLN = 2: a thermal analysis"),
+    "a relaxation": (
+        (*STEEL, "*CONTROL_DYNAMIC_RELAXATION", row(250, 0.001, 0.995, 0, 0, 0, 0.04, 1)), "IDRFLG = 1: a relaxation"
+    ),
+    "material that flows through the mesh": (
+        (*STEEL, "*SECTION_SOLID_TITLE", "air", row(2, 11)), "ELFORM = 11: the material flows through the mesh"
+    ),
     "no equation of state": (
         ("*MAT_JOHNSON_COOK", row(1, "7.85E-9", 8e4), row(300, 400, 0.3, 0.01, 1, 1800, 293, 1), row(4.6e8), row(0)),
         "*PART names no equation of state",
@@ -202,6 +209,21 @@ def test_a_keyword_that_would_change_the_answer_refuses_the_import(tmp_path: Pat
     found = read(tmp_path, "a.k", lsdyna(*cards))
     assert any(message in line for line in found.refusals), found.refusals
     assert all("\n" not in line for line in found.refusals)
+
+
+WITHOUT_EFFECT = {
+    "CONTROL_SOLUTION": row(0, 0, 1, 100), "CONTROL_IMPLICIT_GENERAL": row(0, 0.1), "CONTROL_IMPLICIT_AUTO": row(1),
+    "CONTROL_DYNAMIC_RELAXATION": row(250, 0.001, 0.995), "CONTROL_THERMAL_SOLVER": row(1), "CONTROL_RIGID": row(1),
+    "SECTION_SOLID": row(3, -1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WITHOUT_EFFECT)
+def test_control_cards_without_effect_do_not_refuse(tmp_path: Path, name: str) -> None:
+    found = read(tmp_path, "a.k", lsdyna(*STEEL, f"*{name}", WITHOUT_EFFECT[name]))
+    assert found.refusals == []
+    entry = next(each for each in reversed(found.account.entries) if each.keyword == f"*{name}")
+    assert entry.fate == "left"
 
 
 def test_walls_and_sliding_nodes_off_a_plane_are_reported(tmp_path: Path) -> None:

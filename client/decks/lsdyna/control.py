@@ -10,6 +10,7 @@ from ..contacts import Meeting
 from ..draft import Draft
 from ..units import TIME
 from .fields import Fields, trimmed
+from .words import SWITCHES
 
 SINGLE = frozenset({"CONTACT_AUTOMATIC_SINGLE_SURFACE", "CONTACT_ERODING_SINGLE_SURFACE", "CONTACT_AUTOMATIC_GENERAL",
                     "CONTACT_SINGLE_SURFACE"})  # fmt: skip
@@ -118,6 +119,31 @@ def time_step(draft: Draft, block: Block, entry: Entry) -> None:
     fields.forgive("DTINIT TSLIMT ISDO LCTM", "limits of the step")
     fields.forgive("ERODE MS1ST", "setting for elements with small time steps")
     fields.rest("left")
+
+
+def switch(block: Block, entry: Entry) -> None:
+    """Reads a keyword that has an effect only if one of its fields is not 0. Raises CardError."""
+    layout, name, effect = SWITCHES[block.name]
+    fields = Fields(block, entry, block.cards[:1], (layout,))
+    if value := fields.real(name):
+        entry.refuse(f"{name} = {value:g}: {effect}")
+    else:
+        entry.leave(f"no effect, because {name} is 0")
+
+
+_ALE = frozenset({5, 6, 7, 11, 12})
+"""Formulations of solids in which the material flows through the mesh (the manual, *SECTION_SOLID, ELFORM)."""
+
+
+def section(block: Block, options: frozenset[str], entry: Entry) -> None:
+    """Reads the formulation of solids. Raises CardError."""
+    titled = "TITLE" in options
+    for card in block.cards[titled :: 1 + titled]:
+        form = block.whole(card, block.fields(card, *(10,) * 8)[1], "ELFORM") if card.text.strip() else 0
+        if form in _ALE or "ALE" in options:
+            entry.refuse(f"ELFORM = {form}: the material flows through the mesh (ALE); Conoid's mesh moves with it")
+            return
+    entry.leave("sets how elements are integrated; in Conoid all solids are tets: numerics.pressure")
 
 
 def pictures(draft: Draft, block: Block, entry: Entry, end: float) -> None:

@@ -22,7 +22,7 @@ from .layouts import LAYOUTS, NUMBERS
 from .mesh import held_of, parts_of, read_nodes, read_points
 from .named import Numbered
 from .scene import Scene
-from .words import LEFT, REFUSED, reason
+from .words import LEFT, REFUSED, SWITCHED, SWITCHES, reason
 
 _MESH = ("NODE", "ELEMENT_SOLID")
 _SETS = frozenset({"TITLE", "LIST", "GENERATE", "GENERAL", "ADD", "COLUMN", "COLLECT", "ADVANCED", "INTERSECT"})
@@ -234,6 +234,10 @@ class LsDyna:
         elif name == "DATABASE_BINARY_D3PLOT":
             entry.reasons.clear()
             control.pictures(self._draft, block, entry, self._scene.end)
+        elif name in SWITCHES:
+            control.switch(block, entry)
+        elif name.startswith("SECTION_SOLID"):
+            control.section(block, frozenset(name.split("_")), entry)
         elif not entry.decided and name not in ("CONTROL_TERMINATION",) and not name.startswith(("SET_", "DEFINE_C")):
             self._unknown(name, entry)
 
@@ -241,6 +245,8 @@ class LsDyna:
         plain = NUMBERS.get(name.removesuffix("_TITLE"), name.removesuffix("_TITLE"))
         if plain in LAYOUTS or name.startswith("MAT_"):
             entry.leave("no translated part uses the keyword")
+        elif why := reason(name, SWITCHED):
+            entry.leave(why)
         elif why := reason(name, REFUSED):
             entry.refuse(why)
 

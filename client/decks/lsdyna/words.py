@@ -11,7 +11,16 @@ LEFT: dict[str, str] = {
     "CONTACT_FORCE_TRANSDUCER": "request of output; probes of contact_force_* measure the force on a part",
     "DATABASE": "request of output; a run writes frames, history.csv and probes",
     "HOURGLASS": "tets have no hourglass modes",
-    "SECTION_SOLID": "sets how elements are integrated; in Conoid all solids are tets: numerics.pressure",
+    "CONTROL_CHECK": "check of the mesh",
+    "CONTROL_DEBUG": "output",
+    "CONTROL_DISCRETE_ELEMENT": "setting of particles; elements of particles are refused",
+    "CONTROL_ALE": "setting of ALE elements; sections of ALE elements are refused",
+    "CONTROL_RIGID": "setting of the other code's rigid bodies",
+    "CONTROL_REQUIRE_REVISION": "version of the other code",
+    "CONTROL_SPH": "setting of particles; elements of particles are refused",
+    "CONTROL_SPOTWELD_BEAM": "setting of beams; beams are refused",
+    "CONTROL_STRUCTURED": "output",
+    "CONTROL_SUBCYCLE": "setting of the other code's time steps",
     "CONTROL_ACCURACY": "setting of the other code's algorithms",
     "CONTROL_BULK_VISCOSITY": "Conoid uses its own values (numerics.viscosity)",
     "CONTROL_CONTACT": "setting of the other code's contact algorithm",
@@ -42,9 +51,6 @@ REFUSED: dict[str, str] = {
     "ELEMENT_SPH": "particles: Conoid has tets only",
     "CONSTRAINED": "joins or holds nodes in a way that is not translated",
     "DAMPING": "Conoid has no damping of bodies",
-    "CONTROL_IMPLICIT": "an implicit analysis; Conoid is explicit",
-    "CONTROL_THERMAL": "Conoid computes no conduction of heat",
-    "CONTROL_DYNAMIC_RELAXATION": "a relaxation before the start, which Conoid does not have",
     "INITIAL_STRESS": "initial stresses; in Conoid bodies start without stress",
     "INITIAL_STRAIN": "initial strains; in Conoid bodies start without strain",
     "LOAD": "this load is not translated",
@@ -69,6 +75,22 @@ REFUSED: dict[str, str] = {
 }
 """Keywords that change the answer, with the reason for the refusal. A key of the table is the first words of a
 keyword."""
+
+SWITCHES: dict[str, tuple[str, str, str]] = {
+    "CONTROL_DYNAMIC_RELAXATION": (
+        "NRCYCK DRTOL DRFCTR DRTERM TSSFDR IRELAL EDTTL IDRFLG", "IDRFLG", "a relaxation before the start, which "
+        "Conoid does not have",
+    ),
+    "CONTROL_IMPLICIT_GENERAL": ("IMFLAG", "IMFLAG", "an implicit analysis; Conoid is explicit"),
+    "CONTROL_SOLUTION": ("SOLN", "SOLN", "a thermal analysis; Conoid computes no conduction of heat"),
+}  # fmt: skip
+"""Keywords that have an effect only if a field is not 0: the fields of the first card, this field, and the effect that
+refuses the import."""
+SWITCHED: dict[str, str] = {
+    "CONTROL_IMPLICIT": "no effect without IMFLAG of *CONTROL_IMPLICIT_GENERAL",
+    "CONTROL_THERMAL": "no effect without SOLN of *CONTROL_SOLUTION",
+}
+"""Keywords that have an effect only through a keyword of ``SWITCHES``."""
 
 
 def reason(name: str, table: dict[str, str]) -> str | None:
