@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from .gauges.fields import tet_volumes
 from .materials.elementary import power
 from .materials.law import BULK, DENSITY, SHEAR
 from .model.rows import MASS
@@ -37,5 +38,7 @@ def force_floor(model: Model, comm: Comm) -> float:
     largest = 0.0
     for block in model.blocks:
         volume = float(block.row(MASS).max()) / float(block.params[0])
+        if block.rigid:  # the case may give the mass of a rigid part
+            volume = float(tet_volumes(block.tets, model.nodes.x0).max())
         largest = max(largest, float(block.params[BULK]) * power(volume, 2.0 / 3.0))
     return _SMALLEST_STRAIN * float(comm.maximum(np.array([largest]))[0])

@@ -158,7 +158,7 @@ def second_half(sim: Simulation) -> None:
         boundary.after_move(nodes)  # Row 11: reflect debris that passed a symmetry plane.
     sim.walls.move(clock.dt)
     if sim.rigid is not None:
-        sim.rigid.move(nodes, clock.dt)
+        sim.rigid.move(nodes, clock.dt, clock.t)
     clock.advance()
     _advance_elements(sim, clock.dt)  # Rows 12 and 13: compute stress, forces and limits.
     complete(sim)

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator
 
 from ..model.bodies import Box, Loose, Plate, Tube
+from ..model.courses import Course
 from ..model.schema import Case, Gravity, Part, Prescribed, Rotation, Symmetry, Traction, Wall
 from ..model.solids import Measured
 from ..reading.problems import Location, Problem, problem
@@ -32,6 +33,8 @@ def check_boundaries(case: Case) -> Iterator[Problem]:
                 yield problem(("boundaries", i, "parts", j), name, f"no part of this name; {nearest(name, names)}")
         if isinstance(boundary, Prescribed):
             yield from _prescribed(boundary, ("boundaries", i))
+        elif isinstance(boundary, Rotation):
+            yield from _rotation(boundary, ("boundaries", i))
         elif isinstance(boundary, Gravity):
             yield from _gravity(boundary, ("boundaries", i))
         elif isinstance(boundary, Traction):
@@ -157,12 +160,24 @@ def _traction(boundary: Traction, location: Location) -> Iterator[Problem]:
     yield from _course(boundary, location)
 
 
-def _course(boundary: Prescribed | Gravity | Traction | Wall, location: Location) -> Iterator[Problem]:
-    for k, ((before, _), (after, _)) in enumerate(itertools.pairwise(boundary.course)):
+def _rotation(boundary: Rotation, location: Location) -> Iterator[Problem]:
+    yield from _course(boundary, location)
+    yield from _later(boundary.velocity_course, (*location, "velocity_course"))
+    if boundary.course and not any(boundary.spin.rate):
+        yield problem((*location, "course"), ..., "multiplies spin.rate, which is zero")
+    if boundary.velocity_course and not any(boundary.velocity):
+        yield problem((*location, "velocity_course"), ..., "multiplies velocity, which is zero")
+
+
+def _course(boundary: Prescribed | Rotation | Gravity | Traction | Wall, location: Location) -> Iterator[Problem]:
+    yield from _later(boundary.course, (*location, "course"))
+
+
+def _later(course: Course, location: Location) -> Iterator[Problem]:
+    """Yields a problem for each time that is not later than the time before it."""
+    for k, ((before, _), (after, _)) in enumerate(itertools.pairwise(course)):
         if not after > before:
-            yield problem(
-                (*location, "course", k + 1, 0), after, f"must be later than the time before it, {before:g} s"
-            )
+            yield problem((*location, k + 1, 0), after, f"must be later than the time before it, {before:g} s")
 
 
 def _box(boundary: Prescribed | Traction, location: Location) -> Iterator[Problem]:

@@ -2,7 +2,8 @@
 disagree.
 """
 
-from ..model.boundaries import Boundary, Course, Prescribed, Rotation
+from ..model.boundaries import Boundary, Prescribed, Rotation
+from ..model.courses import Course
 from ..model.tables import Axis
 from ..shapes.geometry import AXES, across
 
@@ -39,8 +40,11 @@ def _straight(speed: float, course: Course) -> Motion:
 
 def _round(boundary: Rotation, axis: Axis) -> Motion:
     """Returns the motion of the velocity component along ``axis`` in a rotation; the component along the axis of the
-    rotation is 0.
+    rotation is the velocity of this axis.
     """
     i, j = across(axis)
     rate = boundary.spin.rate
-    return (boundary.spin.centre, rate) if rate[i] or rate[j] else REST
+    along = _straight(boundary.velocity[AXES.index(axis)], boundary.velocity_course)
+    if not (rate[i] or rate[j]):
+        return along
+    return (boundary.spin.centre, rate, boundary.course, boundary.velocity, boundary.velocity_course)

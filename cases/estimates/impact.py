@@ -6,13 +6,14 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..model.boundaries import Course, Prescribed, Rotation, Traction, Wall
+from ..model.boundaries import Prescribed, Rotation, Traction, Wall
+from ..model.courses import extremes
 from ..model.materials import Material
 from ..model.schema import Case, Part
 from ..model.solids import Measured
 from ..reading.library import material
 from ..shapes.geometry import Vector
-from ..shapes.placed import Placed, driven, velocity
+from ..shapes.placed import Placed, driven, rotated, velocity
 
 FEW, MANY, FULL, MOST = 5, 10, 40, 80
 """Numbers of contact sweeps per time step: the smallest number; the smallest number at high impact speed; the smallest
@@ -62,20 +63,24 @@ def velocities(case: Case, part: Part) -> tuple[Vector, Vector]:
     if isinstance(part.mesh, Measured):
         found = [part.velocity]
     else:
-        moving, (low, high) = driven(case, part), Placed(part.mesh, part.turn).bounds()
-        sides = (low[0], high[0]), (low[1], high[1]), (low[2], high[2])
-        found = [velocity(moving, (x, y, z)) for x, y, z in itertools.product(*sides)]
+        low, high = Placed(part.mesh, part.turn).bounds()
+        corners = list(itertools.product(*((low[k], high[k]) for k in range(3))))
+        found = [velocity(moving, (x, y, z)) for moving in _motions(case, part) for x, y, z in corners]
     for _, drive in case.boundaries_of(Prescribed):
         if not drive.parts or part.name in drive.parts:
-            given = [_given(drive, factor, speeds) for factor in _extremes(drive.course) for speeds in found]
+            given = [_given(drive, factor, speeds) for factor in extremes(drive.course) for speeds in found]
             found = given if drive.low is None and drive.high is None and drive.on is None else [*found, *given]
     least, most = ([pick(each) for each in zip(*found, strict=True)] for pick in (min, max))
     return _shifted(least, -part.jitter), _shifted(most, part.jitter)
 
 
-def _extremes(course: Course) -> tuple[float, float]:
-    factors = [factor for _, factor in course] or [1.0]
-    return min(factors), max(factors)
+def _motions(case: Case, part: Part) -> list[Part]:
+    """Returns a part with its motion at the start, or with the extreme motions of a boundary that rotates it."""
+    turning = rotated(case, part)
+    if turning is None:
+        return [part]
+    factors = itertools.product(extremes(turning.course), extremes(turning.velocity_course))
+    return [driven(case, part, each) for each in factors]
 
 
 def _given(drive: Prescribed, factor: float, speeds: Vector) -> Vector:

@@ -4,10 +4,10 @@ which reduces the time step.
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 
 from ..model.bodies import Tube
-from ..model.boundaries import Around, Course, Traction
+from ..model.boundaries import Around, Traction
+from ..model.courses import Course, factor_at
 from ..model.materials import Material
 from ..model.schema import Case, Part, Symmetry
 from ..model.solids import Measured
@@ -99,20 +99,8 @@ def _outside(tube: Tube, region: Around | None) -> bool:
 def _moved(course: Course, until: float) -> float:
     """Displacement after the time ``until``, m, for an acceleration of 1 m/s^2 times the factor of the course."""
     times = [until * n / 100 for n in range(101)]
-    factors = [_factor(course, time) for time in times]
+    factors = [factor_at(course, time) for time in times]
     return sum((until - time) * factor for time, factor in zip(times, factors, strict=True)) * until / 100
-
-
-def _factor(course: Course, time: float) -> float:
-    """Factor of the course at a time: linear between the pairs of the course, constant before the first pair and after
-    the last pair.
-    """
-    if not course or time <= course[0][0]:
-        return course[0][1] if course else 1.0
-    for (start, low), (end, high) in pairwise(course):
-        if time <= end:
-            return low + (high - low) * (time - start) / (end - start)
-    return course[-1][1]
 
 
 def slenderness(case: Case) -> float:

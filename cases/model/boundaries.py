@@ -4,12 +4,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ..units import Acceleration, Length, Mass, Ratio, Speed, Stress, Time
+from ..units import Acceleration, Length, Mass, Ratio, Speed, Stress
+from .courses import Course
 from .motion import Spin
 from .tables import Axis, Direction, Model, Name, Point, SetName, Velocity
-
-Course = tuple[tuple[Time, Ratio], ...]
-"""A function of time: pairs of a time and a factor."""
 
 
 class Symmetry(Model):
@@ -110,15 +108,22 @@ class Prescribed(Model):
 
 
 class Rotation(Model):
-    """A prescribed rigid rotation of all nodes of the parts at constant angular velocity. Walls do not stop nodes with
-    a prescribed rotation."""
+    """A prescribed rigid rotation of all nodes of the parts about an axis, which may move with a prescribed velocity.
+    The axis keeps its direction. Walls do not stop nodes with a prescribed rotation."""
 
     kind: Literal["rotation"]
     """Selects this boundary."""
     parts: tuple[Name, ...] = ()
     """Names of the parts that rotate; all parts if empty."""
     spin: Spin
-    """Axis of rotation and angular velocity of the prescribed rotation."""
+    """Axis of rotation at the start, and angular velocity of the prescribed rotation."""
+    course: Course = ()
+    """Factor of ``spin.rate`` over time, as pairs of time and factor (see ``kind = "velocity"``). Default: the angular
+    velocity is constant."""
+    velocity: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)
+    """Velocity of the axis of rotation, such as the feed of a drill. The point ``spin.centre`` moves with the axis."""
+    velocity_course: Course = ()
+    """Factor of ``velocity`` over time, as pairs of time and factor. Default: the velocity of the axis is constant."""
     on: SetName | None = None
     """Name of a node set or a surface in the mesh file of the parts (docs/howto/meshes.md): only nodes of this set
     rotate."""

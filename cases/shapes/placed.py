@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from ..model.courses import factor_at
 from ..model.schema import Case, Part, Rotation, Turn
 from . import geometry
 from .geometry import Generated, Vector, across, index
@@ -61,12 +62,26 @@ def _turned(point: Vector, turn: Turn | None, sense: float = 1.0) -> Vector:
     return new[0], new[1], new[2]
 
 
-def driven(case: Case, part: Part) -> Part:
-    """Returns the part with the motion of the boundary ``rotation`` that acts on it, if there is one."""
+def driven(case: Case, part: Part, factors: tuple[float, float] | None = None) -> Part:
+    """Returns the part with the motion of the boundary ``rotation`` that acts on it, if there is one. ``factors``:
+    factors of the rotation and of the velocity of its axis; by default those at the start.
+    """
+    boundary = rotated(case, part)
+    if boundary is None:
+        return part
+    turning, moving = factors or (factor_at(boundary.course, 0.0), factor_at(boundary.velocity_course, 0.0))
+    (x, y, z), (a, b, c) = boundary.velocity, boundary.spin.rate
+    spin = boundary.spin.model_copy(update={"rate": (turning * a, turning * b, turning * c)})
+    speed = moving * x, moving * y, moving * z
+    return part.model_copy(update={"velocity": speed, "spin": spin, "stretch": None})
+
+
+def rotated(case: Case, part: Part) -> Rotation | None:
+    """Returns the boundary ``rotation`` that acts on the part; None if there is none."""
     for _, boundary in case.boundaries_of(Rotation):
         if boundary.on is None and (not boundary.parts or part.name in boundary.parts):
-            return part.model_copy(update={"velocity": (0.0, 0.0, 0.0), "spin": boundary.spin, "stretch": None})
-    return part
+            return boundary
+    return None
 
 
 def velocity(part: Part, point: Vector) -> Vector:

@@ -6,7 +6,8 @@ from itertools import chain, combinations, islice, pairwise
 from typing import NamedTuple
 
 from ..checks.drives import motions
-from ..model.boundaries import Course, Prescribed, Wall
+from ..model.boundaries import Prescribed, Wall
+from ..model.courses import Course, factor_at
 from ..model.schema import Case, Part
 from ..model.solids import Measured
 from ..reading.problems import Problem, problem
@@ -145,14 +146,7 @@ def _integral(course: Course, time: float) -> float:
     if not course:
         return time
     times = sorted({0.0, time, *(t for t, _ in course if 0.0 < t < time)})
-    return sum(0.5 * (b - a) * (_factor(course, a) + _factor(course, b)) for a, b in pairwise(times))
-
-
-def _factor(course: Course, time: float) -> float:
-    for (begin, first), (end, last) in pairwise(course):
-        if begin <= time <= end:
-            return first + (last - first) * (time - begin) / (end - begin)
-    return course[0][1] if time < course[0][0] else course[-1][1]
+    return sum(0.5 * (b - a) * (factor_at(course, a) + factor_at(course, b)) for a, b in pairwise(times))
 
 
 def _size(mesh: Generated) -> float:

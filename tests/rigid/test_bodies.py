@@ -10,6 +10,7 @@ import pytest
 
 from conoid.cases.messages import Energy
 from conoid.cases.model import schema
+from conoid.cases.model.measures import Beyond
 from conoid.worker import step
 from conoid.worker.accounts import digest
 from conoid.worker.errors import PhysicsError
@@ -206,14 +207,26 @@ def test_a_driven_punch_works_from_outside() -> None:
     assert seen.worst < 1e-4
 
 
-def test_prescribed_rotation_is_exact() -> None:
-    spin = schema.Spin(centre=(1e-3, -2e-3, 0.0), rate=(0.0, 0.0, 2e3))
-    turn = schema.Rotation(kind="rotation", spin=spin)
-    sim = run(build(rigid_case([{"rigid": RIGID}], [turn], contact=None, end=1e-3), [TILTED]))
-    angle = 2e3 * sim.clock.t
-    centre = np.array(spin.centre)
-    exact = centre + (sim.model.nodes.x0 - centre) @ rotation((0.0, 0.0, 1.0), -angle).T
-    assert sim.model.nodes.x == pytest.approx(exact, abs=1e-15)
+@pytest.mark.parametrize("how", [{"rigid": RIGID}, {}], ids=["rigid", "deformable"])
+@pytest.mark.parametrize("ramp", [False, True])
+def test_prescribed_rotation_is_exact(how: dict[str, Any], *, ramp: bool) -> None:
+    """The ramps end at half of the time; the energy at the end is that of the rigid motion, and its balance closes."""
+    end, spin = 1e-4, schema.Spin(centre=(1e-3, -2e-3, 0.0), rate=(0.0, 0.0, 2e4))
+    keys: dict[str, Any] = {
+        "course": ((0.0, 0.5), (0.5 * end, -1.0)),
+        "velocity": (7.0, 0.0, -20.0),
+        "velocity_course": ((0.0, 0.0), (0.5 * end, 1.0)),
+    }
+    turn = schema.Rotation(kind="rotation", spin=spin, **(keys if ramp else {}))
+    seen = Seen(rigid_case([how], [turn], contact=None, end=end), [TILTED])
+    nodes, mean, last = seen.sim.model.nodes, *((-0.625, -1.0) if ramp else (1.0, 1.0))
+    assert seen.sim.clock.t == pytest.approx(end, rel=1e-12)
+    centre, moved = np.array(spin.centre), 0.75 * end * np.array(turn.velocity)
+    exact = moved + centre + (nodes.x0 - centre) @ rotation((0.0, 0.0, 1.0), -mean * 2e4 * end).T
+    assert nodes.x == pytest.approx(exact, abs=1e-14)
+    v = np.cross((0.0, 0.0, last * 2e4), nodes.x - centre - moved) + np.array(turn.velocity)
+    assert seen.energies[-1].kinetic == pytest.approx(0.5 * float((nodes.mass[:, None] * v * v).sum()), rel=1e-3)
+    assert seen.worst < 1e-12
 
 
 RAM = schema.Wall(
@@ -259,8 +272,12 @@ def test_probes_of_a_whole_body_have_its_inertia_and_centre() -> None:
     """The values are 1/2 M V^2 + 1/2 w I w, M V, c and V of the body; the values of some of its nodes are sums over
     these nodes.
     """
-    fields = ["kinetic_energy", "momentum_y", "centre_z", "centre_velocity_x", "mass"]
-    probes = [schema.Probe(name=field, part="body0", field=field) for field in fields]  # type: ignore[arg-type]
+    fields = ["kinetic_energy", "momentum_y", "centre_z", "centre_velocity_x", "mass", "fragment_mass"]
+    beyond = {"fragment_mass": Beyond(axis="x")}
+    probes = [
+        schema.Probe(name=field, part="body0", field=field, beyond=beyond.get(field))  # type: ignore[arg-type]
+        for field in fields
+    ]
     everywhere = {"low": (-1.0, -1.0, -1.0), "high": (1.0, 1.0, 1.0)}
     probes.append(schema.Probe(name="nodes", part="body0", field="kinetic_energy", **everywhere))  # type: ignore[arg-type]
     rigid = schema.Rigid(mass=0.5, centre=(2e-3, 3e-3, 4e-3), inertia=(1e-6, 2e-6, 2.5e-6, 0.0, 0.0, 0.0))
@@ -270,9 +287,9 @@ def test_probes_of_a_whole_body_have_its_inertia_and_centre() -> None:
     found, nodes = sim.probes.measure(), sim.model.nodes
     v = np.array([3.0 - 2e3 * 3e-3, 4.0 + 2e3 * 2e-3, 5.0])
     energy = 0.25 * float((v * v).sum()) + 0.5 * 2.5e-6 * 4e6
-    assert found[:5] == pytest.approx([energy, 0.5 * v[1], 4e-3, v[0], 0.5], rel=1e-12)
-    assert found[5] == pytest.approx(0.5 * (nodes.mass[:, None] * nodes.v * nodes.v).sum(), rel=1e-12)
-    assert found[5] != pytest.approx(energy, rel=0.1)
+    assert found[:6] == pytest.approx([energy, 0.5 * v[1], 4e-3, v[0], 0.5, 0.5], rel=1e-12)
+    assert found[6] == pytest.approx(0.5 * (nodes.mass[:, None] * nodes.v * nodes.v).sum(), rel=1e-12)
+    assert found[6] != pytest.approx(energy, rel=0.1)
 
 
 @pytest.mark.parametrize("walls", [True, False])

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from conoid.cases.model import materials
-from conoid.worker.boundaries.drivers import Course, PrescribedVelocity
+from conoid.worker.boundaries.course import Course
+from conoid.worker.boundaries.drivers import PrescribedVelocity
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.state import Indices, Nodes
 from conoid.worker.simulation import Simulation

@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 import conoid.worker
+from conoid.cases.model.schema import Rotation, Spin
 from conoid.worker.boundaries.boundaries import FREE, MIRRORED, PRESCRIBED, Boundary, SymmetryPlane
-from conoid.worker.boundaries.drivers import Course, Driver, Gravity, PrescribedRotation, PrescribedVelocity
+from conoid.worker.boundaries.course import Course
+from conoid.worker.boundaries.drivers import Driver, Gravity, PrescribedRotation, PrescribedVelocity
 from conoid.worker.boundaries.mirrors import Mirrors
+from conoid.worker.boundaries.moving_axis import MovingAxis
 from conoid.worker.boundaries.walls import RigidWalls
 from conoid.worker.contact.exterior import mobilities, symmetry_planes
 from conoid.worker.model.state import Bits, Floats, Nodes
@@ -49,6 +52,9 @@ def test_a_boundary_that_does_not_answer_cannot_be_made() -> None:
         Silent(SOME)  # type: ignore[abstract]
 
 
+AXIS = MovingAxis(Rotation(kind="rotation", spin=Spin(centre=(0.0, 0.0, 0.0), rate=(1.0, 1.0, 1.0))))
+
+
 @pytest.mark.parametrize(
     ("bound", "held"),
     [
@@ -57,7 +63,7 @@ def test_a_boundary_that_does_not_answer_cannot_be_made() -> None:
         (Mirrors(SOME, np.array([1]), np.zeros(1), np.ones((2, 1))), (FREE, FREE, FREE)),
         (SymmetryPlane(SOME, 2), (FREE, FREE, MIRRORED)),
         (PrescribedVelocity(SOME, np.array([np.nan, 0.0, 3.0]), Course()), (FREE, PRESCRIBED, PRESCRIBED)),
-        (PrescribedRotation(SOME, np.zeros(3), np.ones(3)), (PRESCRIBED, PRESCRIBED, PRESCRIBED)),
+        (PrescribedRotation(SOME, AXIS), (PRESCRIBED, PRESCRIBED, PRESCRIBED)),
         (Piston(SOME), (FREE, PRESCRIBED, FREE)),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, Boundary) else "",

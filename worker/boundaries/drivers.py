@@ -1,14 +1,11 @@
 """Boundaries that do external work: gravity, tractions, prescribed motion."""
 
-import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ..clock import MEAN_DT
 from ..kernels.jit import Kernel
-from ..materials.turning import sine_and_cosine
 from ..migration.parcel import Parcel
 from ..model.loads import Load
 from ..model.state import Bits, Floats, Indices, Ints, Nodes, extended
@@ -17,6 +14,8 @@ from ..parallel.arguments import Arguments, Follow
 from ..parallel.team import Stage
 from . import impulses
 from .boundaries import FREE, KEPT, PRESCRIBED, Boundary, free
+from .course import Course
+from .moving_axis import MovingAxis
 
 
 class Driver(Boundary):
@@ -40,30 +39,6 @@ class Driver(Boundary):
 
     def _of(self, state: Nodes) -> tuple[Any, ...]:
         return state.v, state.mass, self.nodes, self._before, self._impulse, self.external_work
-
-
-class Course:
-    """Factor of a load as a function of time. The factor is linear between the given ``points`` (time, s, and factor),
-    and constant before the first and after the last point. Without points the factor is 1.
-    """
-
-    def __init__(self, points: Sequence[tuple[float, float]] = ()) -> None:
-        self._times, self._factors = np.array(list(points) or [(0.0, 1.0)]).T
-        self.constant = float(self._factors[0]) if len(self._factors) == 1 else None
-        """Value of the factor if it is constant, else None."""
-
-    def mean(self, begin: float, end: float) -> float:
-        """Returns the exact mean of the factor between two times, s. If the two times are equal, the result is the
-        factor at that time.
-        """
-        if self.constant is not None:
-            return self.constant
-        within = self._times[(self._times > begin) & (self._times < end)]
-        times = np.array([begin, *within, end])
-        values = np.interp(times, self._times, self._factors)
-        if end <= begin or (values == values[0]).all():
-            return float(values[0])
-        return float((0.5 * np.diff(times) * (values[1:] + values[:-1])).sum() / (end - begin))
 
 
 class Forcing(Driver):
@@ -206,30 +181,20 @@ class PrescribedVelocity(Driver):
 
 
 class PrescribedRotation(Driver):
-    """Prescribed rigid rotation of nodes. The velocity in a step is along the chord of the exact rotation."""
+    """Prescribed rigid rotation of nodes about an ``axis``. The velocity in a step is along the chord of the exact
+    motion.
+    """
 
-    def __init__(self, nodes: Indices, centre: Floats, rate: Floats) -> None:
+    def __init__(self, nodes: Indices, axis: MovingAxis) -> None:
         super().__init__(nodes)
-        self._centre, self._rate = centre, rate
-        self._arguments = Arguments(*impulses.PRESCRIBE)
+        self._axis, self._arguments = axis, Arguments(*impulses.PRESCRIBE)
 
     def held_components(self) -> Bits:
         return np.full((len(self.nodes), 3), PRESCRIBED, np.uint8)
 
     def start(self, state: Nodes) -> None:
-        state.v[self.nodes] = self._chord(state, 0.0)
+        state.v[self.nodes] = self._axis.start(state.x[self.nodes])
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        chord = np.ascontiguousarray(self._chord(state, dt))
+        chord = np.ascontiguousarray(self._axis.chords(state.x[self.nodes], dt, t))
         self._act(impulses.prescribe, self._arguments, state, chord, 1.0)
-
-    def _chord(self, state: Nodes, dt: float) -> Floats:
-        """(n, 3) velocities, m/s, in a step of length ``dt``, s."""
-        r = state.x[self.nodes] - self._centre
-        speed = math.sqrt(sum(float(component) ** 2 for component in self._rate))
-        if dt == 0.0 or speed == 0.0:
-            return np.cross(self._rate, r)
-        axis, (sine, cosine) = self._rate / speed, sine_and_cosine(speed * dt)
-        across = np.cross(axis, r)
-        chord: Floats = (sine * across + (1.0 - cosine) * np.cross(axis, across)) / dt
-        return chord

@@ -27,7 +27,8 @@ from ..parallel.ownership import Neighbour, SharedSum, complete
 from ..parallel.tags import Tag
 from . import impulses
 from .boundaries import KEPT
-from .drivers import Course, Forcing
+from .course import Course
+from .drivers import Forcing
 
 _BITS = 42
 """Binary logarithm of the number of quanta in the largest force on a node of a face at the start. Chosen value: the

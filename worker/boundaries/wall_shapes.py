@@ -8,7 +8,7 @@ from conoid.cases.model.boundaries import Wall
 
 from ..kernels.jit import njit, record, types
 from ..model.state import Floats, Ints
-from .drivers import Course
+from .course import Course
 
 PLANE, CYLINDER, SPHERE = range(3)
 KINDS = ("plane", "cylinder", "sphere")

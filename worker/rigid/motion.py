@@ -1,6 +1,5 @@
 """External loads and constraints of a rigid body: gravity, symmetry planes, prescribed motion."""
 
-import math
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
@@ -9,8 +8,8 @@ import numpy as np
 from conoid.cases.model.schema import Boundary, Case, Gravity, Part, Prescribed, Rotation, Symmetry
 from conoid.cases.shapes.geometry import AXES
 
-from ..boundaries.drivers import Course
-from ..materials.turning import sine_and_cosine
+from ..boundaries.course import Course
+from ..boundaries.moving_axis import MovingAxis
 from ..model.state import Floats
 
 
@@ -26,9 +25,8 @@ class Held:
     driven: dict[int, tuple[float, Course]] = field(default_factory=dict)
     """Dictionary of prescribed velocities; the keys are axes. A value contains the velocity along the axis, m/s, and
     its factor as a function of time."""
-    spin: tuple[Floats, Floats] | None = None
-    """Point on the axis of a prescribed rotation, m, and the rotation vector, rad/s; None if no rotation is
-    prescribed."""
+    spin: MovingAxis | None = None
+    """Axis of the prescribed rotation; None if no rotation is prescribed."""
     pulls: list[tuple[Floats, Course]] = field(default_factory=list)
     """Accelerations of gravity, m/s^2, with their factors as functions of time."""
     prescribed: bool = False
@@ -61,7 +59,7 @@ class Held:
                     self._fix(AXES.index(axis), speed, Course(boundary.course))
         elif isinstance(boundary, Rotation):
             self.prescribed, self.free, self.turns = True, np.zeros(3), np.zeros(3)
-            self.spin = np.array(boundary.spin.centre), np.array(boundary.spin.rate)
+            self.spin = MovingAxis(boundary)
 
     def _fix(self, axis: int, speed: float, course: Course) -> None:
         """Prescribes the velocity of all nodes along an axis, so that the body can turn about that axis only."""
@@ -72,8 +70,7 @@ class Held:
     def begin(self, speed: Floats, rate: Floats, centre: Floats) -> tuple[Floats, Floats]:
         """Returns the velocity of the ``centre``, m/s, and the rotation vector, rad/s, at the start."""
         if self.spin is not None:
-            arm = centre - self.spin[0]
-            return np.cross(self.spin[1], arm), self.spin[1]
+            return self.spin.start(centre[None])[0], self.spin.mean_rate(0.0, 0.0)
         return self._driven(speed, 0.0, 0.0), rate * self.turns
 
     def kept(self, momentum: Floats) -> Floats:
@@ -83,7 +80,7 @@ class Held:
     def kick(self, speed: Floats, centre: Floats, last_dt: float, dt: float, t: float) -> Floats:
         """(3,) velocity v*(n+1/2), computed from v(n-1/2), m/s."""
         if self.spin is not None:
-            return np.asarray((self.turned(centre, dt) - centre) / dt) if dt > 0.0 else speed
+            return self.spin.chords(centre[None], dt, t)[0] if dt > 0.0 else speed
         gained = speed
         for acceleration, course in self.pulls:
             factor = course.mean(t - 0.5 * last_dt, t + 0.5 * dt)
@@ -96,23 +93,10 @@ class Held:
             found[axis] = given * course.mean(begin, end)
         return found
 
-    def turned(self, point: Floats, dt: float) -> Floats:
-        """(3,) position of a point after the prescribed rotation of a step ``dt``, s."""
-        assert self.spin is not None
-        axis, sine, cosine = self._angle(dt)
-        arm = point - self.spin[0]
-        across = np.cross(axis, arm)
-        return np.asarray(point + sine * across + (1.0 - cosine) * np.cross(axis, across))
-
-    def half(self, dt: float) -> Floats:
-        """(3,) unit axis of the prescribed rotation of a step ``dt``, s, times the tangent of half of the rotation
-        angle.
+    def half(self, dt: float, t: float) -> Floats:
+        """(3,) unit axis of the prescribed rotation of the step ``dt``, s, from the time ``t``, times the tangent of
+        half of the rotation angle.
         """
-        axis, sine, cosine = self._angle(dt)
-        return np.asarray(axis * (sine / (1.0 + cosine)))
-
-    def _angle(self, dt: float) -> tuple[Floats, float, float]:
         assert self.spin is not None
-        rate = self.spin[1]
-        size = math.sqrt(float(rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]))
-        return (rate / size, *sine_and_cosine(size * dt)) if size > 0.0 else (rate, 0.0, 1.0)
+        axis, sine, cosine = self.spin.angle(dt, t)
+        return np.asarray(axis * (sine / (1.0 + cosine)))

@@ -58,7 +58,11 @@ class Rigid:
         self.account = BodyAccount(bodies)
         self.last_dt = self.last_push = 0.0
         """Last time step, s; and simulated time of the last impulse of contact or a wall, s."""
-        self._least = RIGID_STEPS / case.run.end_time if len(case.rigid) == len(case.parts) else 0.0
+        driven = [held.spin.fastest for held in bodies.held if held.spin is not None]
+        self._least = max(
+            RIGID_STEPS / case.run.end_time if len(case.rigid) == len(case.parts) else 0.0,
+            max(driven, default=0.0) / _TURN,
+        )
         self._start, self._rate = np.zeros((2, bodies.n, 3)), np.zeros((bodies.n, 3))
         """Velocities and rotation vectors before the impulses of the step; and present rotation vectors, rad/s."""
         self.share = 1.0
@@ -115,8 +119,8 @@ class Rigid:
 
     @property
     def limit(self) -> float:
-        """Returns 1 / longest allowed step, 1/s. No body may turn by more than _TURN in a step. A run that has only
-        rigid parts makes RIGID_STEPS steps.
+        """Returns 1 / longest allowed step, 1/s. No body may turn by more than _TURN in a step, also at the largest
+        prescribed rate. A run that has only rigid parts makes RIGID_STEPS steps.
         """
         rate = self.bodies.rates(self.bodies.momentum)
         return max(float(np.sqrt(dot(rate, rate)).max(initial=0.0)) / _TURN, self._least)
@@ -137,6 +141,7 @@ class Rigid:
         bodies = self.bodies
         for b, held in enumerate(bodies.held):
             bodies.speed[b] = held.kick(bodies.speed[b], bodies.centre[b], self.last_dt, dt, t)
+            self._spin(b, dt, t)
         self.contacts.begin()
         self.bonds.begin()
         self.last_dt = dt
@@ -162,23 +167,22 @@ class Rigid:
         self._rate[:] = bodies.rates(bodies.momentum)
         self._carry(nodes)
 
-    def move(self, nodes: Nodes, dt: float) -> None:
+    def move(self, nodes: Nodes, dt: float, t: float) -> None:
         """Computes positions and orientations at n+1, and sets the velocities of the nodes to the motion of the
-        bodies.
+        bodies. ``dt``: step from the time ``t``, s.
         """
         bodies = self.bodies
         bodies.centre += dt * bodies.speed
         rotation.turn(bodies.q, bodies.momentum, bodies.rotation, bodies.inverse, bodies.loose, dt)
         for b, held in enumerate(bodies.held):
             if held.spin is not None:
-                rotation.multiply(bodies.q, b, *held.half(dt).tolist(), True)
+                rotation.multiply(bodies.q, b, *held.half(dt, t).tolist(), True)
             elif bodies.turns[b].any() and not bodies.turns[b].all():
                 rate = 0.5 * dt * self._rate[b]
                 rotation.multiply(bodies.q, b, *rate.tolist(), True)
         bodies.pose()
-        for b, held in enumerate(bodies.held):
-            if held.spin is not None:
-                bodies.momentum[b] = times(bodies.about(b)[None], held.spin[1][None])[0]
+        for b in range(bodies.n):
+            self._spin(b, dt, t)
         self._rate[:] = bodies.rates(bodies.momentum)
         rotation.place(nodes.x, self.nodes, self._body, self._arms, bodies.rotation, bodies.centre)
         self._carry(nodes)
@@ -214,6 +218,15 @@ class Rigid:
             return np.asarray(self.stops.given[walls].sum(axis=(0, 1)))
         body = int(self.of_part[part])
         return self.stops.given[walls, body].sum(axis=0) if body >= 0 else np.zeros(3)
+
+    def _spin(self, b: int, dt: float, t: float) -> None:
+        """Sets the angular momentum of a body to that of its prescribed rotation, if it has one, in the step ``dt``, s,
+        from the time ``t``.
+        """
+        axis = self.bodies.held[b].spin
+        if axis is not None:
+            rate = axis.mean_rate(t, t + dt)
+            self.bodies.momentum[b] = times(self.bodies.about(b)[None], rate[None])[0]
 
     def _carry(self, nodes: Nodes) -> None:
         """Sets the velocities of the nodes to the motion of their bodies."""

@@ -6,7 +6,9 @@ from conoid.cases.checks.on import bits
 from conoid.cases.model import schema
 
 from ..boundaries.boundaries import Boundary, SymmetryPlane, driven, mirrored
-from ..boundaries.drivers import Course, Gravity, PrescribedRotation, PrescribedVelocity, Traction
+from ..boundaries.course import Course
+from ..boundaries.drivers import Gravity, PrescribedRotation, PrescribedVelocity, Traction
+from ..boundaries.moving_axis import MovingAxis
 from ..boundaries.moving_walls import MovingWalls
 from ..boundaries.surface_pressure import SurfacePressure
 from ..boundaries.wall_shapes import Walls
@@ -100,8 +102,7 @@ def build(
             velocity = np.array([np.nan if c is None else c for c in (spec.x, spec.y, spec.z)])
             boundaries.append(PrescribedVelocity(_indices(h), velocity, Course(spec.course)))
         elif isinstance(spec, schema.Rotation):
-            centre, rate = np.array(spec.spin.centre), np.array(spec.spin.rate)
-            boundaries.append(PrescribedRotation(_indices(h), centre, rate))
+            boundaries.append(PrescribedRotation(_indices(h), MovingAxis(spec)))
     moved = driven(nodes.n, boundaries)
     planes, stopped = mirrored(nodes.n, boundaries), [h & ~moved for h in held]
     return [*boundaries, *_walls(case, stopped, planes), *_moving(case, stopped, planes, model, moving, comm)]

@@ -211,7 +211,7 @@ def _block(case: schema.Case, piece: Piece, index: int) -> Block:
     chosen = chosen[np.argsort(~piece.border[chosen], kind="stable")]
     rows = models.rows_of(material, case.numerics.pressure)
     state = np.zeros((-(-len(chosen) // CHUNK), rows, CHUNK))
-    state[:, MASS, :] = chunked(piece.tet_volume[chosen] * material.density)
+    state[:, MASS, :] = chunked(piece.tet_volume[chosen] * _density(part, material.density, piece, index))
     for row, value in models.beginning(material, part.temperature).items():
         if row < rows:
             state[:, row, :] = value
@@ -220,6 +220,16 @@ def _block(case: schema.Case, piece: Piece, index: int) -> Block:
     made = block(case, index, piece.tet_ids[chosen], tets, state, across, int(piece.border[chosen].sum()))
     made.group = piece.tet_group[chosen]
     return made
+
+
+def _density(part: schema.Part, density: float, piece: Piece, index: int) -> float:
+    """Return the mass of a part divided by the volume of its mesh, kg/m^3: ``density``, unless the case gives the mass
+    of a rigid part.
+    """
+    if part.rigid is None or part.rigid.mass is None:
+        return density
+    tets = np.append(piece.part_starts, piece.totals[0])[index + 1] - piece.part_starts[index]
+    return part.rigid.mass / float(tets * piece.mean_volumes[index])
 
 
 def block(
