@@ -129,7 +129,9 @@ class Holding:
             return
         table: dict[str, Any] = {"kind": "velocity"}
         if some and hold.chosen.on is None:
-            hold.entry.refuse(f"{hold.chosen.what} has only some nodes of a part and is not a named set of the mesh")
+            hold.entry.refuse(
+                f"{hold.chosen.what} has only some nodes of a part and is no set of the mesh; define a set of them"
+            )
             return
         if some:
             table["on"] = hold.chosen.on

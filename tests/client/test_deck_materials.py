@@ -298,7 +298,7 @@ def test_johnson_cook_of_radioss(tmp_path: Path) -> None:
     found = read(tmp_path, "a_0000.rad", radioss(
         "/MAT/PLAS_JOHNS/1", "copper", r20("8.96E-9"), r20(1.24e5, 0.34), r20(90.0, 292.0, 0.31, 0, 0),
         r20(0.025, 1.0), r20(1.09, 1356.0, 3.43168, 298.0), "/FAIL/JOHNSON/1", r20(0.54, 4.89, -3.03, 0.014, 1.12),
-        r20(1.0) + row(1, 1),
+        r20(1.0) + row(1, 1) + r20("", 0) + row("", 0),
     ))  # fmt: skip
     law = johnson_cook(material(found))
     for strain, rate, temperature in POINTS:

@@ -181,3 +181,19 @@ def test_a_contact_with_a_part_that_has_no_solids_is_left_out(tmp_path: Path) ->
     (entry,) = [each for each in found.account.entries if each.keyword.startswith("*CONTACT")]
     assert (entry.fate, found.data.get("contact")) == ("left", "none")
     assert "has no part of the case" in entry.reasons[0]
+
+
+SINGLE = ("*BOUNDARY_SPC_NODE", *(row(node, 0, 1, 1, 1, 0, 0, 0) for node in (1, 2, 3)))
+
+
+def test_single_held_nodes_are_one_group(tmp_path: Path) -> None:
+    """A boundary of a case selects nodes by the name of a set: a set with the same nodes is used."""
+    (refusal,) = read(tmp_path, "a.k", lsdyna(*STEEL, *SINGLE)).refusals
+    assert "the group of 3 nodes has only some nodes of a part and is no set of the mesh" in refusal
+    found = read(tmp_path, "b.k", lsdyna(*STEEL, *SINGLE, "*SET_NODE_LIST", row(9), row(3, 1, 2)))
+    assert found.refusals == []
+    (held,) = bare(found.data["boundaries"])
+    assert held == {"kind": "velocity", "on": "9", "x": "0 mm/s", "y": "0 mm/s", "z": "0 mm/s"}
+    plane = ("*BOUNDARY_SPC_NODE", *(row(node, 0, 0, 0, 1) for node in (1, 2, 3)))
+    (mirror,) = bare(read(tmp_path, "c.k", lsdyna(*STEEL, *plane)).data["boundaries"])
+    assert mirror == {"kind": "symmetry", "axis": "z", "at": "0 mm"}

@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from conoid.client.decks.importing import lines
+from conoid.client.decks.toml import bare
 
-from .deck_texts import STEEL, lsdyna, read, row
+from .deck_texts import INSTANCES, STEEL, lsdyna, read, row
 
 TWO_TETS = (
     "*PART", "other", row(2, 1, 1), "*NODE", "\n".join(f"{i:8}{x:16.3f}{y:16.3f}{z:16.3f}" for i, x, y, z in (
@@ -40,3 +41,33 @@ def test_two_tolerances_of_one_tied_pair_refuse(tmp_path: Path) -> None:
     found = read(tmp_path, "a.k", lsdyna(*STEEL, *TWO_TETS, *tie, row(1, 1, -0.5), *tie, row(1, 1, -0.1)))
     assert any("body and other are tied twice, with different tolerances" in line for line in found.refusals)
     assert len(found.data["bond"]) == 1
+
+
+TIED = (
+    "*Nset, nset=bottom, instance=two\n1, 2, 3\n*Surface, name=nodes, type=NODE\nbottom,\n"
+    "*Elset, elset=body, instance=one\n1\n*Surface, name=faces, type=ELEMENT\nbody,\n"
+    "*Tie, name=t, position tolerance=0.25, adjust=no\nnodes, faces\n"
+)
+
+
+def test_a_tie_of_abaqus_joins_nodes_to_faces(tmp_path: Path) -> None:
+    found = read(tmp_path, "a.inp", INSTANCES.format(sets=TIED))
+    assert found.refusals == []
+    (bond,) = found.data["bond"]
+    assert (set(bond["parts"]), bond["gap"]) == ({"one", "two"}, "0.25 mm")
+    assert "ADJUST=NO: the deck keeps the distance" in "\n".join(lines(found, "a.toml"))
+
+
+def test_a_pressure_of_abaqus_follows_its_surface(tmp_path: Path) -> None:
+    load = "*Amplitude, name=A\n0., 0., 1e-6, 1., 1., 1.\n*Step\n*Dynamic, Explicit\n, 1e-5\n"
+    load += "*Dsload, amplitude=A\nfaces, P, 12.5\n"
+    deck = INSTANCES.format(sets=TIED).replace("*Step\n*Dynamic, Explicit\n, 1e-5\n", load)
+    found = read(tmp_path, "a.inp", deck)
+    assert found.refusals == []
+    (boundary,) = bare(found.data["boundaries"])
+    assert boundary == {
+        "kind": "traction", "pressure": "12.5 MPa", "follows": True, "on": "faces", "parts": ["one"],
+        "course": [["0 s", 0.0], ["1e-06 s", 1.0], ["1 s", 1.0]],
+    }  # fmt: skip
+    (refusal,) = read(tmp_path, "b.inp", deck.replace("P, 12.5", "TRVEC, 12.5, 1, 0, 0")).refusals
+    assert "only pressures ('surface, P, size') are translated" in refusal

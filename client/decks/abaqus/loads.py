@@ -97,7 +97,7 @@ class Loads:
         kind = each.key("TYPE") or "DISPLACEMENT"
         if each.key("OP") == "NEW":
             raise InpError("OP=NEW removes earlier restraints")
-        course = self._course(each.get("AMPLITUDE"), each.entry)
+        course = self.course(each.get("AMPLITUDE"), each.entry)
         each.forgive("LOAD CASE, REGION TYPE", "no meaning in Conoid")
         each.rest()
         speeds: dict[str, dict[str, tuple[float, Course]]] = {}
@@ -143,7 +143,7 @@ class Loads:
             f"line {line}: TYPE = {kind}: only velocities, and displacements with an amplitude, are translated"
         )
 
-    def _course(self, name: str | None, entry: Entry) -> Course | None:
+    def course(self, name: str | None, entry: Entry) -> Course | None:
         """Returns times and factors of an amplitude. Raises InpError if the amplitude is not a table."""
         if not name:
             return None
@@ -226,7 +226,7 @@ class Loads:
     # Gravity and output -----------------------------------------------------------------------------------------------
 
     def _dload(self, each: Keyword, end: float) -> None:
-        course = self._course(each.get("AMPLITUDE"), each.entry)
+        course = self.course(each.get("AMPLITUDE"), each.entry)
         each.forgive("OP", "a case with one step has one list of loads")
         each.rest()
         for line, items in each.lists():

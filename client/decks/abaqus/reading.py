@@ -1,6 +1,6 @@
 """Import of an Abaqus/Explicit input file as a case."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from pathlib import Path
 
@@ -20,6 +20,8 @@ from .loads import Loads
 from .materials import Heat, Material, weighed
 from .meetings import Meetings
 from .mesh import AbaqusMesh
+from .pressure import Pressures
+from .surfaces import Surfaces
 from .words import LEFT, MATERIAL, REFUSED, spelt
 
 _MESH = ("NODE", "ELEMENT")
@@ -96,14 +98,16 @@ class Abaqus:
         end = loads.end(self.of("STEP"), self.of("DYNAMIC"))
         self._make_materials(system, bodies, loads.adiabatic)
         self._rigid(bodies)
+        surfaces = Surfaces(self.of("SURFACE"), self.of("ELSET"), lambda: self.mesh, self.topology)
+        pressures = Pressures(self._draft, loads.course, surfaces.bodies, bodies)
         for each in self.keywords:
-            self._guarded(loads, each, end)
+            self._guarded(loads.take if each.word != "DSLOAD" else pressures.take, each, end)
         loads.temperatures(bodies, self.topology, self._zero())
         begin(self._draft, self.topology, bodies, loads.starts)
         for body in bodies:
             self._draft.add_part(body, names)
         Holding(self._draft, self.topology, bodies).add(loads.holds, [])
-        meetings = Meetings(self.keywords, bodies, self._surface)
+        meetings = Meetings(self.keywords, bodies, surfaces.bodies)
         meet(self._draft, bodies, meetings.made)
         join(self._draft, self.topology, bodies, meetings.ties)
         self._leave_rest()
@@ -206,9 +210,9 @@ class Abaqus:
         found = {key for key, elements in parts.items() if elements and elements <= wanted}
         return found if wanted == set().union(*(parts[key] for key in found)) else set()
 
-    def _guarded(self, loads: Loads, each: Keyword, end: float) -> None:
+    def _guarded(self, take: Callable[[Keyword, float], None], each: Keyword, end: float) -> None:
         try:
-            loads.take(each, end)
+            take(each, end)
         except (InpError, ValueError) as error:
             each.entry.refuse(str(error))
 
@@ -268,29 +272,3 @@ class Abaqus:
         if each.scope in self.instances:
             return {each.scope}
         return {name for name, one in self.instances.items() if one.key("PART") == each.scope} | {each.key("INSTANCE")}
-
-    def _surface(self, name: str, entry: Entry) -> frozenset[str]:
-        """Returns the bodies that have elements of a named surface."""
-        sets: list[str] = []
-        for each in self.of("SURFACE"):
-            if each.key("NAME") == joined(name):
-                if (each.key("TYPE") or "ELEMENT") != "ELEMENT":
-                    raise InpError(f"the surface {name!r} is of the type {each.key('TYPE')}; only ELEMENT is supported")
-                each.entry.take(f"of {entry.keyword}, {entry.place}")
-                sets += [items[0] for _, items in each.lists()]
-        if not sets:
-            raise InpError(f"the surface {name[:60]!r} is not defined, or has no elements")
-        if any(not one for one in sets):
-            return frozenset(self.topology.bodies)
-        members = {one: self.mesh.named(one, "element_sets") for one in sets}
-        if lost := [one for one, elements in members.items() if not elements]:
-            raise InpError(f"the surface {name[:60]!r} uses the set {lost[0][:60]!r}, which has no elements")
-        wanted = set().union(*(elements or () for elements in members.values()))
-        pairs = {key: key.partition("|") for key in self.topology.bodies}
-        found = {
-            key for key, (scope, _, elset) in pairs.items() if not self.mesh.body(scope, elset)[0].isdisjoint(wanted)
-        }
-        for each in self.of("ELSET"):
-            if any(each.key("ELSET") == joined(one.rpartition(".")[2]) for one in sets):
-                each.entry.take(f"of the surface {name}")
-        return frozenset(found)

@@ -44,7 +44,6 @@ REFUSED: dict[str, str] = {
     "EMBEDDED ELEMENT": "embedded bodies: Conoid has no such bodies",
     "RIGID BODY": "a rigid body that is not one whole section of solids",
     "CONTACT EXCLUSIONS": "pairs without contact; in Conoid all parts of contact.parts are in contact",
-    "DSLOAD": "a load on surfaces is not translated; use [[boundaries]] kind = \"traction\"",
     "CLOAD": "forces on nodes are not translated; [[boundaries]] kind = \"traction\" acts on faces",
     "TEMPERATURE": "prescribed temperatures",
     "FIELD": "prescribed fields", "IMPORT": "imports the state of another analysis",

@@ -92,19 +92,24 @@ def velocity_rigid(scene: Scene, block: Block, options: frozenset[str], entry: E
 
 
 def restraint(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """Reads ``*BOUNDARY_SPC_SET`` and ``*BOUNDARY_SPC_NODE``: nodes that are fixed along some axes."""
-    single = "NODE" in options
+    """Reads ``*BOUNDARY_SPC_SET`` and ``*BOUNDARY_SPC_NODE``: nodes that are fixed along some axes. The single nodes of
+    one keyword with the same fixed axes become one group.
+    """
+    groups: dict[str, set[int]] = {}
     for card in list(block.filled())["ID" in options :]:
         fields = Fields(block, entry, [card], ("ID CID DOFX DOFY DOFZ DOFRX DOFRY DOFRZ",))
         fields.refuse("CID", "local axes are not translated")
         fields.forgive("DOFRX DOFRY DOFRZ", "nodes of solids have no rotations")
-        speeds = {axis: 0.0 for axis, name in zip("xyz", _CORNERS.split(), strict=True) if fields.whole(name)}
+        axes = "".join(axis for axis, name in zip("xyz", _CORNERS.split(), strict=True) if fields.whole(name))
         number = fields.whole("ID")
-        chosen = _single(number) if single else scene.nodes(number, entry)
-        if speeds:
-            scene.holds.append(Hold(chosen, entry, speeds))
-        else:
+        if not axes:
             entry.leave("no translation is held")
+        elif "NODE" in options:
+            groups.setdefault(axes, set()).add(number)
+        else:
+            scene.holds.append(Hold(scene.nodes(number, entry), entry, dict.fromkeys(axes, 0.0)))
+    for axes, nodes in groups.items():
+        scene.holds.append(Hold(scene.group(nodes), entry, dict.fromkeys(axes, 0.0)))
 
 
 _TC = {1: "x", 2: "y", 3: "z", 4: "xy", 5: "yz", 6: "xz", 7: "xyz"}

@@ -63,6 +63,18 @@ class Numbered:
         parts = (every.get(str(part), set()) for part in found.parts)
         return found.nodes.union(within if found.ranges else (), *parts)
 
+    def group(self, nodes: set[int]) -> Chosen:
+        """Returns single nodes as the target of a load: the set with exactly these nodes if the deck has one, because
+        a boundary of a case selects nodes by the name of a set.
+        """
+        what = f"node {min(nodes)}" if len(nodes) == 1 else f"the group of {len(nodes)} nodes"
+        for number, found in self.node_sets.items():
+            plain = not (found.odd or found.everything or found.sets or found.parts or found.ranges)
+            if plain and found.nodes == nodes:
+                found.entry.take(f"set with the nodes of {what}")
+                return Chosen(what, nodes=lambda: nodes, on=str(number))
+        return Chosen(what, nodes=lambda: nodes)
+
     def part(self, number: int) -> Chosen:
         """Returns a part by its number, as the target of a load."""
         return Chosen(f"part {number}", bodies=frozenset({str(number)}))

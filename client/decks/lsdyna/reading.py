@@ -171,7 +171,7 @@ class LsDyna:
         self._make_materials(system)
         end, named = self._end(), self._numbered
         named.topology = self._topology
-        self._scene = Scene(self._draft, named.nodes, named.part_set, named.part, named.curve, end)
+        self._scene = Scene(self._draft, named.nodes, named.part_set, named.part, named.group, named.curve, end)
         self._meetings: list[Meeting] = []
         self._ties: list[Tie] = []
         for block, entry in self._blocks:

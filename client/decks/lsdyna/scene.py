@@ -21,6 +21,8 @@ class Scene:
     bodies: Callable[[int, Entry], Chosen]
     """Function that returns a part set by its number; the function raises ValueError."""
     part: Callable[[int], Chosen]
+    group: Callable[[set[int]], Chosen]
+    """Function that returns the target of single nodes."""
     curve: Callable[[int], Course]
     """Function that returns a curve by its number; the function raises ValueError."""
     end: float

@@ -54,6 +54,8 @@ REFUSED: dict[str, str] = {
     "INITIAL_STRESS": "initial stresses; in Conoid bodies start without stress",
     "INITIAL_STRAIN": "initial strains; in Conoid bodies start without strain",
     "LOAD": "this load is not translated",
+    "LOAD_SEGMENT": 'a pressure on faces is not translated; write [[boundaries]] kind = "traction" with pressure, '
+    "follows = true, and on = the set of the faces",
     "BOUNDARY": "this boundary condition is not translated",
     "INITIAL": "this initial condition is not translated",
     "RIGIDWALL": "a finite rigid wall, or friction that depends on the direction; walls of a case are infinite planes, "

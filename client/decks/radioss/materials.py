@@ -30,7 +30,7 @@ LAYOUTS: dict[str, tuple[str, ...]] = {
         "K1 K2 K3 BETA",
     ),
     "GRUNEISEN": ("C S1 S2 S3", "GAMMA0 ALPHA E0 RHO_0"),
-    "JOHNSON": ("D1 D2 D3 D4 D5", "EPS_DOT_0 IFAIL_SH: IFAIL_SO: - DADV IXFEM:"),
+    "JOHNSON": ("D1 D2 D3 D4 D5", "EPS_DOT_0 IFAIL_SH: IFAIL_SO: - DADV -: IXFEM:"),
 }  # fmt: skip
 """Names of the fields on the lines after the title of an option, as in the guide."""
 
