@@ -4,6 +4,7 @@ MPI uses CPU time while it waits. The time in calls that wait for other ranks co
 other phases is work. The loading of kernels at their first call counts in no phase. A parallel region is a call of
 ``Team.run``; all threads of the rank share its tasks. The wall time in parallel regions is ``parallel``; the wall time
 outside of them, without the waiting, is ``serial``: one thread of the rank works and the other threads are idle.
+A single rank reads the CPU time only for reports, and divides it among the phases in proportion to their wall times.
 """
 
 from collections.abc import Sequence
@@ -81,6 +82,7 @@ class Timers:
 
     def __init__(self, comm: Comm, team: Team) -> None:
         self._comm, self._team = comm, team
+        self._alone = comm.size == 1
         self._blocks = {name: _Phase(self, name) for name in PHASES}
         self.spent = Spent()
         self.begin()
@@ -98,6 +100,7 @@ class Timers:
             self.spent.projected.setdefault(crew, _none())["rest"] = 0.0
         self._phase = "rest"
         self._cpu, self._wall = cpu_time(), wall_time()
+        self._settled = self._cpu
         self._waited, self._within = self._comm.waited, self._team.within
         for each in (self.spent.cpu, self.spent.serial, self.spent.parallel):
             each["rest"] = 0.0
@@ -110,10 +113,11 @@ class Timers:
     def switch(self, name: str) -> str:
         """End the present phase, begin another phase, and return the phase that ended.
 
-        Each change of phase reads the clock of the thread, a system call of up to 1 us. Therefore a step changes the
-        phase as rarely as possible.
+        With several ranks each change of phase reads the clock of the thread, a system call of 1 to 2 us. Therefore a
+        step changes the phase as rarely as possible.
         """
-        cpu, wall, waited, within = cpu_time(), wall_time(), self._comm.waited, self._team.within
+        wall, waited, within = wall_time(), self._comm.waited, self._team.within
+        cpu = self._cpu_at(wall)
         ended, spent = self._phase, self.spent
         idle, inside = waited - self._waited, within - self._within
         spent.cpu[ended] += cpu - self._cpu - idle
@@ -133,7 +137,8 @@ class Timers:
         ``inside``, ``outside``: wall time of the program in and outside of parallel regions, s, keyed by phase; the
         rest of the time belongs to the present phase.
         """
-        cpu, wall, spent = cpu_time(), wall_time(), self.spent
+        wall, spent = wall_time(), self.spent
+        cpu = self._cpu_at(wall)
         of_program = sum(inside.values()) + sum(outside.values())
         passed = max(wall - self._wall, of_program)
         outside = {**outside, self._phase: outside.get(self._phase, 0.0) + passed - of_program}
@@ -143,6 +148,21 @@ class Timers:
                 of[name] += added
                 spent.cpu[name] += share * added
         self._cpu, self._wall, self._within = cpu, wall, self._team.within
+
+    def _cpu_at(self, wall: float) -> float:
+        """Return the CPU time of this thread at the wall time ``wall``, s. With one rank, which never waits, the CPU
+        time is assumed to advance like the wall time until ``_settle`` corrects it.
+        """
+        return self._cpu + wall - self._wall if self._alone else cpu_time()
+
+    def _settle(self) -> None:
+        """Scale the CPU times since the last report, so that their sum is the measured CPU time."""
+        measured = cpu_time()
+        assumed = self._cpu - self._settled
+        share = (measured - self._settled) / assumed if assumed > 0.0 else 0.0
+        for name, before in self._reported.cpu.items():
+            self.spent.cpu[name] = before + share * (self.spent.cpu[name] - before)
+        self._cpu = self._settled = measured
 
     def _project(self, phase: str, serial: float) -> None:
         """Add to a phase the CPU time outside of parallel regions, and the time in parallel regions that is estimated
@@ -157,6 +177,8 @@ class Timers:
     def since_last(self) -> Spent:
         """Return the time since the last call of this method. The method must be called between phases."""
         self.switch(self._phase)
+        if self._alone:
+            self._settle()
         self.spent.helped = self._team.helped - self._helped
         added = self.spent.since(self._reported)
         self._reported = self.spent.copy()

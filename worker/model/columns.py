@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .growing import spare
+from .growing import address_of, spare
 
 
 class Rule(IntFlag):
@@ -95,7 +95,7 @@ class Columns:
             else:
                 for k in some.names.values():
                     self._set(k, None)
-        fill(self._words, self._words.ctypes.data, n, more)
+        fill(self._words, address_of(self._words), n, more)
 
     def copy(self, sources: "npt.NDArray[Any]", targets: "npt.NDArray[Any]") -> None:
         """Copies the rows ``sources`` (k,) to the rows ``targets`` (k,) in the columns with the rule COPIED. Both
@@ -103,7 +103,7 @@ class Columns:
         """
         from .inheriting import copy
 
-        copy(self._words, self._words.ctypes.data, sources, targets)
+        copy(self._words, address_of(self._words), sources, targets)
 
     def _set(self, k: int, room: "np.ndarray | None") -> None:
         self._rooms[k] = room
@@ -128,4 +128,4 @@ def _words(room: "np.ndarray | None", rule: Rule) -> tuple[int, int, int, int, b
     if room is None:
         return 0, 0, 0, 0, False
     value = _ALL_BITS if rule & ABSENT else 0
-    return room.ctypes.data, room.nbytes, room.nbytes // len(room), value, bool(rule & COPIED)
+    return address_of(room), room.nbytes, room.nbytes // len(room), value, bool(rule & COPIED)

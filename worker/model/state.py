@@ -203,7 +203,8 @@ class Block:
     rigid: bool = False
     """True if the part is rigid. Passes over elements omit a rigid part."""
     seconds: float = 0.0
-    """CPU time of the passes over the block, s; it is measured only if the rank has several blocks."""
+    """Time of the passes over the block, s: CPU time, or wall time if the rank has no neighbours. The time is measured
+    only if the rank has several blocks."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(n,) group of each tet (Model.groups); (0,) if loads of groups are not recorded."""
     moved: int = 0

@@ -15,7 +15,8 @@ import numpy as np
 from llvmlite import ir
 
 from ..kernels.jit import intrinsic, packed, several, types
-from .array_words import ALONE, LAST, NUMBER, address_of, write_leaves, write_values
+from ..model.growing import address_of
+from .array_words import ALONE, LAST, NUMBER, name_of, write_leaves, write_values
 
 _WORD, _BIT = ir.IntType(64), ir.IntType(1)
 """LLVM types: a word of a table, and a flag."""
@@ -52,10 +53,10 @@ class Arguments:
         words = np.zeros(sum(leaves), np.int64)
         self._words = words.data
         self._reals = self._words.cast("B").cast("d")
-        self.address = int(words.ctypes.data)
+        self.address = address_of(words)
         """Address of the table, which kernels take as argument."""
         self._leaves = np.array([self._leaf(k, kind) for k, kind in enumerate(self._kinds)], np.int64)
-        self._leaves_at = int(self._leaves.ctypes.data)
+        self._leaves_at = address_of(self._leaves)
         self._kept: list[Any] = [None] * len(leaves)
         """Leaves of the table that ``put`` has written; the references keep their memory."""
         self._values: tuple[Any, ...] = ()
@@ -70,7 +71,7 @@ class Arguments:
         """Return the description of leaf number ``k``; see array_words.py."""
         if not isinstance(kind, types.Array):
             return self.place(k), NUMBER, 0, 0, 0
-        return self.place(k), kind.ndim, int(_is_strided(kind)), id(_dtype(kind)), 0
+        return self.place(k), kind.ndim, int(_is_strided(kind)), name_of(_dtype(kind)), 0
 
     def set(self, *values: Any) -> int:
         """Write the arguments into the table and return its address. Arrays that are already in the table are not
@@ -92,13 +93,13 @@ class Arguments:
         """Divide the leaves of the table among the ``values`` of ``set``."""
         sizes = [len(value) if isinstance(value, tuple) else ALONE for value in values]
         self._sizes = np.array(sizes, np.int64)
-        self._sizes_at = int(self._sizes.ctypes.data)
+        self._sizes_at = address_of(self._sizes)
         fields = [(of, field) for of, size in enumerate(sizes) for field in (range(size) if size >= 0 else (-1,))]
         self._numbers = [(k, *at) for k, at in enumerate(fields) if not isinstance(self._kinds[k], types.Array)]
 
     def _write_all(self, values: tuple[Any, ...]) -> None:
         """Write all arrays by numpy's functions. ``set`` calls this method if an array is of a subclass, or of a type
-        that equals the declared one without being the same object; the method raises ValueError if the type differs.
+        that equals the declared one but has another number in numpy. Raises ValueError if the type differs.
         """
         self._leaves[:, LAST] = 0
         leaves = [leaf for value in values for leaf in (value if isinstance(value, tuple) else (value,))]
@@ -167,7 +168,7 @@ class Handle:
         sizes = [sum(1 for kind in each for _ in _leaves(kind)) for each in kinds]
         self._first = np.cumsum([0, *sizes])[:-1].tolist()
         self._words = np.array([self._every.place(first) for first in self._first])
-        self.address = int(self._words.ctypes.data)
+        self.address = address_of(self._words)
 
     def set(self, k: int, *leaves: Any) -> None:
         """Write the arguments of the tables from number ``k`` on, one table after the other. A record is replaced by

@@ -19,11 +19,13 @@ _TYPE, _SIZE, _ITEMS = 1, 2, 3
 """Words of a tuple: type, number of items, first item."""
 _DATA, _NDIM, _SHAPE, _STRIDES, _DTYPE, _FLAGS = 2, 3, 4, 5, 7, 8
 """Words of an array: address of the data, number of axes, address of the shape and of the strides, dtype, flags."""
+_NAME = 3
+"""Word of a dtype that contains its kind, byte order and type number (``PyArray_Descr``)."""
 _C_ORDER = 1
 """Flag of an array in C order (NPY_ARRAY_C_CONTIGUOUS)."""
 LEAF = 5
 """Number of words that describe a leaf of a table: address of the words of the table; number of axes, -1 for a number;
-1 for strides; address of the dtype; address of the array that was written last."""
+1 for strides; word _NAME of the dtype; address of the array that was written last."""
 _AT, _AXES, _STRIDED, _KIND, LAST = range(LEAF)
 NUMBER = -1
 """Number of axes in the description of a number or a flag."""
@@ -38,7 +40,7 @@ def _write_leaf(leaf, item, array_type):  # type: ignore[no-untyped-def]
     if axes == NUMBER or item == word_at(leaf, LAST):
         return True
     strided = word_at(leaf, _STRIDED) == 1
-    if word_at(item, _TYPE) != array_type or word_at(item, _DTYPE) != word_at(leaf, _KIND):
+    if word_at(item, _TYPE) != array_type or word_at(word_at(item, _DTYPE), _NAME) != word_at(leaf, _KIND):
         return False
     if word_at(item, _NDIM) & _HALF != axes or not (strided or word_at(item, _FLAGS) & _C_ORDER):
         return False
@@ -89,6 +91,6 @@ def write_values(leaves, sizes, values, n, array_type):  # type: ignore[no-untyp
     return True
 
 
-def address_of(array: Any) -> int:
-    """Returns the address of the first item of an array; ``array.ctypes.data`` gives the same number more slowly."""
-    return int(_word(id(array) + _WORD * _DATA).value)
+def name_of(dtype: Any) -> int:
+    """Returns the word of a dtype that contains its kind, byte order and type number."""
+    return int(_word(id(dtype) + _WORD * _NAME).value)

@@ -122,6 +122,15 @@ def _whole(words: Ints) -> Floats:
     return np.array([float((a << _LIMB_BITS) + b) for a, b in pairs]).reshape(high.shape)
 
 
+@njit("void(int64[:, ::1])", cache=True)
+def _carry(words):  # type: ignore[no-untyped-def]
+    """Move the overflow of the low limbs to the high limbs (``Tally.carry``)."""
+    for j in range(words.shape[1]):
+        over = (words[1, j] + (1 << (_LIMB_BITS - 1))) >> _LIMB_BITS
+        words[0, j] += over
+        words[1, j] -= over << _LIMB_BITS
+
+
 class Tally:
     """Sums that are accumulated over a whole run. The sums are integers in two limbs, and do not depend on the order of
     the terms and on the ranks.
@@ -154,10 +163,7 @@ class Tally:
         Each value adds at most 2^29 quanta to a low limb. Without ``carry`` the limb would overflow after 2^34 values,
         and contact may add so many values in a long run.
         """
-        high, low = self.words
-        over = (low + (1 << (_LIMB_BITS - 1))) >> _LIMB_BITS
-        high += over
-        low -= over << _LIMB_BITS
+        _carry(self.words)
 
     def total(self, comm: Comm) -> Floats:
         """Return (k,) the sums over all ranks. Collective."""

@@ -35,10 +35,12 @@ class _Range:
         if many > len(self._room):
             first = self.size * np.arange(2 * many)
             self._room = np.column_stack([first, first + self.size])
-        before = self.many(self._n) - 1
-        self._room[before, 1] = self._room[before, 0] + self.size
-        self._room[many - 1, 1], self._starts[1], self._n = n, many, n
-        self._tasks = self._room[:many]
+        before = self.many(self._n)
+        if before != many:
+            if before:
+                self._room[before - 1, 1] = before * self.size
+            self._starts[1], self._tasks = many, self._room[:many]
+        self._room[many - 1, 1], self._n = n, n
 
 
 class Ranges(_Range):

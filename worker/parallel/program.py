@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels.jit import Kernel, njit
+from ..model.growing import address_of
 from ..model.state import Ints
-from .array_words import address_of
 from .team import CLOCK, END, KERNEL, MOST, SIZE, TABLE, WITHIN, Stage, Team, divide, share
 from .words import call_task, now, word_at
 

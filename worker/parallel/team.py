@@ -23,9 +23,9 @@ from typing import Protocol
 import numpy as np
 
 from ..kernels.jit import Kernel, njit
+from ..model.growing import address_of
 from ..model.state import Ints
 from .arguments import Tie
-from .array_words import address_of
 from .words import SECOND, TASK, add, call_task, load, now, sched_yield, sem_post, sem_wait, swap, word_at
 
 __all__ = ["TASK", "Stage", "Team", "team"]
