@@ -81,7 +81,8 @@ class Probe(Model):
     sums are computed from the mass, the centre of mass and the inertia of the part.
 
     **Behind a target**: ``residual_mass`` is the mass of the part ``beyond`` a plane, ``residual_velocity`` is its
-    mass-weighted mean velocity along the normal, positive away from the plane, 0 without mass. ``fragment_mass`` and
+    mass-weighted mean velocity along the normal, positive away from the plane, 0 without mass. A run warns if at its
+    end a tenth of the part or more has not reached the plane and still moves towards it. ``fragment_mass`` and
     ``fragment_velocity`` are the mass and the velocity of the heaviest fragment whose centre is beyond the plane; the
     tets of a fragment are joined by faces.
 

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from conoid.cases.load import apply_overrides, parse_case
+from conoid.cases.warnings.unreached import Before, unreached
 from conoid.worker import simulation
+from conoid.worker.gauges.unreached import found as reported
 from conoid.worker.parallel.comm import SerialComm
 
 from .kernels import run
@@ -49,3 +51,26 @@ def test_a_faster_rod_leaves_the_plate_faster() -> None:
     assert found[0].tolist() == [0.0, 0.0]
     assert 0.0 < found[1, 0] < found[2, 0] < 1200.0
     assert (found[1:, 1] > 0.0).all()
+
+
+def warned(speed: float, end: float) -> list[str]:
+    case = parse_case(apply_overrides(CASE, {"parts[0].velocity[2]": speed, "run.end_time": end}))
+    sim = simulation.build(case, Path(), SerialComm())
+    run(sim)
+    return list(reported(sim))
+
+
+def test_a_run_that_ends_before_the_plane_is_passed_is_reported() -> None:
+    """The value 0 then means neither a stopped rod nor a residual velocity. After the passage no warning is given."""
+    (text,) = warned(700.0, 2e-6)
+    assert text.startswith("probes[0], 'v': at the end 100 % of the mass of 'rod' has not reached the plane z = 1.5 mm")
+    assert "increase run.end_time" in text
+    assert warned(1200.0, 1.2e-5) == []
+
+
+@pytest.mark.parametrize(
+    ("share", "speed", "number"), [(1.0, 60.0, 1), (1.0, 40.0, 0), (1.0, -60.0, 0), (0.05, 500.0, 0)]
+)
+def test_a_stopped_part_and_debris_are_not_reported(share: float, speed: float, number: int) -> None:
+    case = parse_case(apply_overrides(CASE, {"parts[0].velocity[2]": 1000.0}))
+    assert len(list(unreached(case, {0: Before(share, speed)}))) == number

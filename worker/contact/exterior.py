@@ -76,13 +76,17 @@ class Exterior:
         self.cracks = Cracks.resume(parcel.rows["contact.cracks"], root, self._model.blocks, nodes)
 
     def require_faces(self, allowed: Flags) -> None:
-        """Raises InputError on all ranks if a part that may be in contact has no exposed face. ``allowed`` (parts,
-        parts): pairs of parts that may be in contact.
+        """Raises InputError on all ranks if a part that may be in contact has no exposed face, and no part of the same
+        body has one. A core inside a jacket with common nodes gets exposed faces when the jacket erodes. ``allowed``
+        (parts, parts): pairs of parts that may be in contact.
         """
         model = self._model
         first = np.searchsorted(model.nodes.id, self.surface.faces.nodes[:, 0])
         counts = self._comm.sum(np.bincount(model.nodes.part[first], minlength=len(model.parts)).astype(np.int64))
-        for index in np.flatnonzero((counts == 0) & allowed.any(axis=1)):
+        exposed, joined = counts > 0, self._comm.sum(model.nodes.joined_parts(len(model.parts))) > 0
+        for _ in model.parts:
+            exposed |= joined[:, exposed].any(axis=1)
+        for index in np.flatnonzero(~exposed & allowed.any(axis=1)):
             raise InputError(
                 f"contact: part {model.parts[index]!r} has no exposed face, all lie on symmetry planes; "
                 "leave it out of contact.parts"

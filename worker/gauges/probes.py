@@ -68,6 +68,10 @@ class Probes:
                     f"probes[{k}]: no {what} of part {probe.part!r} has {where} between low and high{both}"
                 )
 
+    def before(self, number: int, v: Floats) -> tuple[float, float]:
+        """Return what ``NodeSums.before`` returns for the probe with this ``number``. Collective."""
+        return self._sums.before(number, v)
+
     def keep(self) -> list[Any]:
         """Return the state of the gauges for a checkpoint. All ranks return equal values."""
         return [gauge.keep() for gauge in self._gauges]

@@ -43,6 +43,19 @@ class NodeSums:
         found = {k: _value(probe, next(sums), next(sums)) for k, probe in self._probes.items()}
         return found | self._of_bodies(v)
 
+    def before(self, number: int, v: Floats) -> tuple[float, float]:
+        """Return the share of the mass of a probe that is not beyond its plane, and the mean velocity, m/s, of this
+        mass towards the plane. ``v`` (nodes, 3): velocities. Collective.
+        """
+        probe = self._probes[number]
+        assert probe.beyond is not None
+        part = self._scene.model.parts.index(probe.part)
+        mass = np.where(self.present(probe), self._scene.model.nodes.mass_of(part), 0.0)
+        short = np.where(ahead(probe.beyond, self._scene.model.nodes.x) > 0.0, 0.0, mass)
+        along = short * v[:, _AXES.index(probe.beyond.axis)] * way(probe.beyond)
+        whole, left, momentum = exact_sums(self._scene.comm, np.column_stack([mass, short, along])).tolist()
+        return (left / whole if whole > 0.0 else 0.0), (momentum / left if left > 0.0 else 0.0)
+
     def keep(self) -> Any:
         return None
 
@@ -60,14 +73,17 @@ class NodeSums:
             inside = inside & held(nodes.marks, self._bits[probe.on])
         return np.asarray(nodes.owned & nodes.in_part(part) & inside)
 
+    def present(self, probe: Probe) -> Flags:
+        """Return (nodes,) the flags of ``started`` without the nodes that have been removed."""
+        found, erosion = self.started(probe), self._scene.erosion
+        return found if erosion is None else np.asarray(found & ~erosion.removed)
+
     def chosen(self, probe: Probe) -> Flags:
         """Return (nodes,) whether each node belongs to the probe and is owned by this rank."""
-        nodes, erosion, found = self._scene.model.nodes, self._scene.erosion, self.started(probe)
-        if erosion is not None:
-            found &= ~erosion.removed
+        found = self.present(probe)
         if probe.beyond is not None:
-            found &= ahead(probe.beyond, nodes.x) > 0.0
-        return np.asarray(found)
+            found &= ahead(probe.beyond, self._scene.model.nodes.x) > 0.0
+        return found
 
     def _of_bodies(self, v: Floats) -> dict[int, float]:
         """Return the values of probes of whole rigid parts; these probes are not sums over nodes, because inertia and

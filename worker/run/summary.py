@@ -18,7 +18,7 @@ from ..accounts import digest
 from ..accounts.timers import Spent, by_phase
 from ..contact.checks import common_volume, inside
 from ..errors import PhysicsError
-from ..gauges import reference, unstrained
+from ..gauges import reference, unreached, unstrained
 from ..model.state import Ints
 from ..output.counts import fragments, of_bodies
 from ..output.history import extremes
@@ -60,6 +60,7 @@ def sum_up(loop: Loop, folder: Path, failure: PhysicsError | None, start: Start,
     contact, warnings = _penetration(sim, labels if sim.record is not None else of_bodies(sim))
     compressed = sim.crushing.found() if sim.crushing is not None else []
     stiff = list(unstrained.found(sim, folder, eroded)) if complete else []
+    short = list(unreached.found(sim)) if complete else []
     return Outcome(
         **_end(loop, failure), **costs, **contact, digest=hexdigest or "",
         steps=sim.clock.step, time=sim.clock.t, elements=start.elements, eroded=eroded,
@@ -69,7 +70,7 @@ def sum_up(loop: Loop, folder: Path, failure: PhysicsError | None, start: Start,
         energy=loop.samples.energy, worst_residual=sim.ledger.worst,
         made=[Made(line=name, share=made.share, time=made.t) for name, made in sim.ledger.making.ranked()],
         compressed=compressed, without=without(sim.case), reference=checks, probes=_probes(loop, folder),
-        warnings=[*borne(compressed), *start.warnings, *_warnings(loop, eroded), *warnings, *stiff],
+        warnings=[*borne(compressed), *start.warnings, *_warnings(loop, eroded), *warnings, *short, *stiff],
     )  # fmt: skip
 
 
