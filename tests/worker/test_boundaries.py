@@ -202,22 +202,38 @@ def test_a_body_through_a_symmetry_plane_is_refused() -> None:
     assert build(scene(STEEL, boundaries=({"kind": "symmetry", "axis": "y", "at": 0.0},)), [even]).warnings == ()
 
 
+AROUND_Y, AROUND_Z = (
+    {"centre": (0.0, 0.0, 0.0), "rate": rate} for rate in ((0.0, 1e3, 0.0), (0.0, 0.0, 1e3))
+)  # fmt: skip
+
+
 @pytest.mark.parametrize(
     "drive",
     [
         {"kind": "velocity", "x": 1.0, "z": 3.0},
         {"kind": "velocity", "z": 3.0, "course": ((0.0, 0.0), (1e-6, 1.0))},
-        {"kind": "rotation", "spin": {"centre": (0.0, 0.0, 0.0), "rate": (0.0, 1e3, 0.0)}},
+        {"kind": "rotation", "spin": AROUND_Y},
+        {"kind": "rotation", "spin": AROUND_Y, "course": ((0.0, 0.0), (1e-6, 1.0))},
+        {"kind": "rotation", "spin": AROUND_Z, "velocity": (0.0, 0.0, 3.0)},
     ],
-    ids=["at once", "later", "turning"],
+    ids=["at once", "later", "turning", "turning later", "with the axis"],
 )
-def test_motion_across_a_symmetry_plane_is_refused(drive: dict[str, Any]) -> None:
+@pytest.mark.parametrize("rigid", [None, schema.Rigid()], ids=["deformable", "rigid"])
+def test_motion_across_a_symmetry_plane_is_refused(drive: dict[str, Any], rigid: schema.Rigid | None) -> None:
     plane = {"kind": "symmetry", "axis": "z"}
     with pytest.raises(
         InputError, match=r"^boundaries\[1\]: leads nodes off their plane of symmetry, boundaries\[0\], along z"
     ):
-        build(scene(STEEL, boundaries=(plane, drive)), [MESH])
-    build(scene(STEEL, boundaries=(plane, {"kind": "velocity", "x": 1.0, "z": 0.0})), [MESH])
+        build(_as(rigid, scene(STEEL, boundaries=(plane, drive))), [MESH])
+    for along in (
+        {"kind": "velocity", "x": 1.0, "z": 0.0},
+        {"kind": "rotation", "spin": AROUND_Z, "velocity": (1.0, 0.0, 0.0)},
+    ):
+        build(_as(rigid, scene(STEEL, boundaries=(plane, along))), [MESH])
+
+
+def _as(rigid: schema.Rigid | None, case: schema.Case) -> schema.Case:
+    return case.model_copy(update={"parts": (case.parts[0].model_copy(update={"rigid": rigid}),)})
 
 
 def test_a_body_may_fly_at_a_symmetry_plane() -> None:

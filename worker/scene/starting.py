@@ -43,7 +43,7 @@ def start(
         if index not in beside and known[index]:
             raise InputError(f"boundaries[{index}]: holds no node; check its place and its parts")
     _refuse_two_drives(case.boundaries, held, comm)
-    _refuse_conflicts(case.boundaries, held, boundaries, model.nodes, comm)
+    _refuse_conflicts(case.boundaries, held, model, comm)
     _refuse_overlaps(case, model, boundaries, comm)
     _refuse_crossings(case, model, comm)
     _refuse_off_plane(case, held, model, comm)
@@ -148,24 +148,17 @@ def _two_drives(specs: Sequence[schema.Boundary], held: list[Flags]) -> int:
     return -1
 
 
-def _refuse_conflicts(
-    specs: Sequence[schema.Boundary], held: list[Flags], boundaries: list[Boundary], nodes: Nodes, comm: Comm
-) -> None:
+def _refuse_conflicts(specs: Sequence[schema.Boundary], held: list[Flags], model: Model, comm: Comm) -> None:
     """Raise InputError if a motion is prescribed across a symmetry plane at any time, because the plane would do
     work.
     """
-    before = nodes.v.copy()
-    for boundary in boundaries:
-        boundary.start(nodes)
     planes = [(index, spec.axis) for index, spec in enumerate(specs) if isinstance(spec, schema.Symmetry)]
     crossed = np.zeros((len(planes), len(specs)))
     for row, (plane, axis) in zip(crossed, planes, strict=True):
-        turned = (nodes.v[:, AXES[axis]] != 0.0) & held[plane]
         for drive, spec in enumerate(specs):
             if motions(spec).get(axis, REST) != REST:
-                nodes_of_both = turned if isinstance(spec, schema.Rotation) else held[plane]
-                row[drive] = float((nodes_of_both & held[drive]).any())
-    nodes.v[:] = before
+                across = _leaves(spec, axis, model) if isinstance(spec, schema.Rotation) else True
+                row[drive] = float((across & held[plane] & held[drive]).any())
     crossed = comm.maximum(crossed.reshape(-1)).reshape(crossed.shape)
     for row, drive in np.argwhere(crossed):
         plane, axis = planes[row]
@@ -173,3 +166,15 @@ def _refuse_conflicts(
             f"boundaries[{drive}]: leads nodes off their plane of symmetry, boundaries[{plane}], along {axis}; allowed "
             "is motion along it"
         )
+
+
+def _leaves(spec: schema.Rotation, axis: str, model: Model) -> Flags:
+    """Return (n,) whether a rotation leads each node off a plane normal to ``axis`` at any time. A node on the axis of
+    the rotation leaves the plane with this axis.
+    """
+    rate, along = np.array(spec.spin.rate), AXES[axis]
+    moves = spec.velocity[along] != 0.0
+    across = np.cross(rate, model.nodes.x0 - np.array(spec.spin.centre))
+    least = _ASIDE * model.size * np.abs(rate).max()
+    turns = np.delete(rate, along).any() & (np.abs(across) > least).any(axis=1)
+    return np.asarray(turns | moves)
