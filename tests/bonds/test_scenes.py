@@ -80,3 +80,23 @@ def test_three_parts_tied_in_a_ring_lose_no_energy(sizes: tuple[float, float, fl
     corner = np.flatnonzero(np.abs(sim.model.nodes.x0 - [1e-3, 0.0, 1e-3]).max(axis=1) < 1e-9)
     assert len(corner) == 3
     assert np.ptp(sim.model.nodes.v[corner], axis=0).max() < 0.05 * np.abs(sim.model.nodes.v[corner]).max()
+
+
+def test_a_part_that_fractures_beside_a_bond_keeps_the_momentum() -> None:
+    """A tied node loses mass to copies that have no face of the interface; the impulses of the bond act on the mass
+    that the node has left.
+    """
+    brittle = "density = 7850\nbrittle = { strength = 150e6, energy = 200 }\n"
+    above = block("above", (0.5, 0.5, 0), (4.5, 4.5, 4), 1, "velocity = [0, 0, -30]\nfracture = { model = 'cohesive' }")
+    text = start(4e-6, 0.3).replace("density = 7850\n", brittle) + block("below", (0, 0, -4), (5, 5, 0), 1.3)
+    sim = built(text + "[contact]\n" + above + BOND)
+    momenta: list[np.ndarray] = []
+
+    def look() -> None:
+        sim.ledger.close(sim.model.nodes.v)
+        momenta.append(np.array(sim.ledger.momentum))
+
+    run(sim, look)
+    assert sim.fracture is not None
+    assert sim.model.nodes_global > 300
+    assert np.abs(np.array(momenta) - momenta[0]).max() < 1e-13 * np.abs(momenta[0]).max()

@@ -51,6 +51,8 @@ class Bonds:
         self._mean_dt = 0.0
         """Time for which the last impulses acted, s."""
         self._layout: Layout | None = None
+        self._mass = np.zeros(0)
+        """Mass of each node of the layout on this rank, kg, from which the layout was made."""
         if len(pieces):
             self._rebuild()
 
@@ -100,10 +102,11 @@ class Bonds:
         self.account.add(layout.nodes.total[layout.held])
 
     def follow(self) -> None:
-        """Updates the tied rows after a node of a face has separated, a tet of a face was removed, or a row has failed.
-        Collective.
+        """Updates the tied rows after a node has separated, a tet of a face was removed, or a row has failed. A copy
+        that has no face of the interface takes mass from a tied node, too. Collective.
         """
-        changed = np.array([float(self.apart or self.ties.faces.changed())])
+        lighter = (self._model.nodes.mass[self._laid.local] != self._mass).any()
+        changed = np.array([float(self.apart or lighter or self.ties.faces.changed())])
         if self._comm.maximum(changed)[0] > 0.0:
             self._rebuild()
 
@@ -158,6 +161,7 @@ class Bonds:
             rows, states, self._laws, nodes, mobility, planes, self._rigid, self.account.scale, self._comm
         )  # fmt: skip
         self._layout.number = np.flatnonzero(acts)[self._layout.number]
+        self._mass = nodes.mass[self._layout.local]
         self.apart = False
         self.ties.mark(self.ties.rows.take(intact))
 
