@@ -83,7 +83,7 @@ class Exterior:
         model = self._model
         first = np.searchsorted(model.nodes.id, self.surface.faces.nodes[:, 0])
         counts = self._comm.sum(np.bincount(model.nodes.part[first], minlength=len(model.parts)).astype(np.int64))
-        exposed, joined = counts > 0, self._comm.sum(model.nodes.joined_parts(len(model.parts))) > 0
+        exposed, joined = counts > 0, self._comm.sum(model.nodes.shares.joined(model.nodes.part, len(model.parts))) > 0
         for _ in model.parts:
             exposed |= joined[:, exposed].any(axis=1)
         for index in np.flatnonzero(~exposed & allowed.any(axis=1)):

@@ -58,6 +58,14 @@ class Shares:
         more = self.part != part[self.node]
         return np.concatenate([np.arange(len(part)), self.node[more]]), np.concatenate([part, self.part[more]])
 
+    def joined(self, part: Indices, parts: int) -> Ints:
+        """Return (parts, parts) 1 for pairs of parts with a common node on this rank, of which one represents the node,
+        else 0. Chains of such pairs connect all parts of a body. ``part`` (n,): representative part of each node.
+        """
+        found = np.zeros((parts, parts), np.int64)
+        found[part[self.node], self.part] = 1
+        return found | found.T
+
     def of_nodes(self, local: Indices) -> "Shares":
         """Return the rows of the nodes that have a new index in ``local`` (nodes,), with the new index. ``local`` is -1
         for omitted nodes.

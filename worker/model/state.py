@@ -116,14 +116,6 @@ class Nodes:
         """Return (m,) nodes and (m,) their parts; see Shares.members."""
         return self.shares.members(self.part)
 
-    def joined_parts(self, parts: int) -> Ints:
-        """Return (parts, parts) 1 for pairs of parts with a common node on this rank, of which one represents the node,
-        else 0. Chains of such pairs connect all parts of a body.
-        """
-        found = np.zeros((parts, parts), np.int64)
-        found[self.part[self.shares.node], self.shares.part] = 1
-        return found | found.T
-
     def mass_of(self, part: int) -> Floats:
         """Return (n,) the mass that each node has from tets of the part, kg."""
         mass, shares = np.where(self.part == part, self.mass, 0.0), self.shares
