@@ -58,7 +58,7 @@ def alike(values: Iterable[float | None], unit: str = "", digits: int = 3) -> li
     the largest value.
     """
     known = [math.nan if value is None else float(value) for value in values]
-    worth, name = _unit(known, unit, digits)
+    worth, name = shared_unit(known, unit, digits)
     return [_with(_number(value / worth, digits), name) if not math.isnan(value) else UNKNOWN for value in known]
 
 
@@ -75,7 +75,7 @@ def vector(values: Iterable[float | None], unit: str = "", digits: int = 3, betw
 def vectors(rows: Iterable[Iterable[float | None]], unit: str = "", digits: int = 3, between: str = ", ") -> list[str]:
     """Returns the texts of several vectors, such as a column of a table; all texts have the same prefix."""
     known = [[math.nan if value is None else float(value) for value in row] for row in rows]
-    worth, name = _unit([value for row in known for value in row], unit, digits)
+    worth, name = shared_unit([value for row in known for value in row], unit, digits)
     return [_with(between.join(_trimmed(_number(value / worth, digits)) for value in row), name) for row in known]
 
 
@@ -88,8 +88,10 @@ def large(value: float | None) -> str:
     return _with(_number(known / worth, 3), name)
 
 
-def _unit(values: Sequence[float], unit: str, digits: int) -> tuple[float, str]:
-    """Returns the common factor of the unit of all values, and the name of the unit."""
+def shared_unit(values: Sequence[float], unit: str, digits: int = 3) -> tuple[float, str]:
+    """Returns the common factor of the unit of all values, and the name of the unit: the unit in which values are
+    written side by side, such as the ticks of an axis.
+    """
     most = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
     if unit not in _LADDERS or most == 0.0:
         return 1.0, unit

@@ -82,7 +82,7 @@ class Printer:
 
     def _lay(self, n: int) -> picture_layout.Sheet:
         picture, shots, head, side = self._picture, self._shots, 0, 0
-        field, size = FIELDS[picture.field], picture_layout.font(picture.look.size)
+        field, size = FIELDS[picture.field], picture_layout.font(picture.look)
         if picture_layout.captioned(picture):
             head = round(2.6 * size) if picture.title or n == 1 else 0
             if self._scale is not None:

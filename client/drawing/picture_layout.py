@@ -10,11 +10,14 @@ from conoid.cases.figures import exacts
 from . import camera
 from .camera import Camera
 from .picture import Picture
+from .view_options import Look
 
 Box = tuple[int, int, int, int]
 """A rectangle: left, top, width and height, pixels."""
 _FILL = 0.34
 """Largest width of the colour bar or legend, relative to the width of the picture. Chosen value."""
+_ENLARGED = 1.6
+"""Height of letters in a picture without captions, relative to a picture with captions. Chosen value."""
 LEAST = 200
 """Shortest side of a picture that has captions, pixels. Chosen value."""
 
@@ -49,9 +52,13 @@ def captioned(picture: Picture) -> bool:
     return picture.look.captions and min(picture.look.size) >= LEAST
 
 
-def font(size: tuple[int, int]) -> int:
-    """Returns the height of letters in a picture of this size, pixels."""
-    return max(8, round(0.0125 * math.sqrt(size[0] * size[1]) + 4.2))
+def font(look: Look) -> int:
+    """Returns the height of letters in a picture, pixels. Pictures without captions stand in a page that shows them
+    smaller than they are, so their letters are larger.
+    """
+    width, height = look.size
+    height_of_letters = 0.0125 * math.sqrt(width * height) + 4.2
+    return max(8, round(height_of_letters if look.captions else _ENLARGED * height_of_letters))
 
 
 def lay(near: Sequence[Any], every: Sequence[Any], n: int, picture: Picture, head: int, side: int) -> Sheet:
@@ -68,7 +75,7 @@ def lay(near: Sequence[Any], every: Sequence[Any], n: int, picture: Picture, hea
     boxes = [(across * (k % columns), head + down * (k // columns), across, down) for k in range(n)]
     eye = camera.place(near, every, picture, across / down)
     beside = (width - side, head, side, height - head)
-    return Sheet(boxes, (0, 0, width, head), beside, columns, font(picture.look.size), eye)
+    return Sheet(boxes, (0, 0, width, head), beside, columns, font(picture.look), eye)
 
 
 def when(times: Sequence[float | None]) -> list[str]:

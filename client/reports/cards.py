@@ -4,7 +4,7 @@ import json
 from collections.abc import Sequence
 from html import escape
 
-from conoid.cases.figures import alike, count, counted, crew, duration, exact, percent, rough, si, vector
+from conoid.cases.figures import alike, count, counted, crew, duration, exact, percent, rough, shared_unit, si, vector
 from conoid.cases.messages import Balance, Log
 from conoid.cases.outcome import Outcome
 from conoid.cases.output.fragments import Fit
@@ -42,12 +42,13 @@ def references(ended: Outcome | None) -> str:
 
 
 def results(ended: Outcome | None) -> str:
-    """Returns a table of the probes: last value and extremes."""
+    """Returns a table of the probes: unit, last value and extremes."""
     rows = []
     for probe in ended.probes if ended is not None else ():
-        last, least, most = alike((probe.value, probe.least, probe.most), probe.unit)
-        rows.append([probe.name, last, least, most])
-    return html.table(["probe", "at the end", "least", "most"], rows, [1, 2, 3]) if rows else ""
+        values = probe.value, probe.least, probe.most
+        worth, unit = shared_unit([value for value in values if value is not None], probe.unit)
+        rows.append([probe.name, *alike(None if value is None else value / worth for value in values), unit])
+    return html.table(["probe", "at the end", "least", "most", "unit"], rows, [1, 2, 3]) if rows else ""
 
 
 def warnings(ended: Outcome | None) -> str:
@@ -72,7 +73,8 @@ def case(entries: dict[str, object]) -> str:
             (part.get("fracture") or {}).get("model", ""),
         ])  # fmt: skip
     about = f"<p>{escape(str(entries.get('description', '')))}</p>" if entries.get("description") else ""
-    return about + html.table(["part", "material", "shape", "element size", "velocity", "breaks"], rows)
+    names = ["part", "material", "shape", "element size", "velocity", "breaks"]
+    return about + html.table(names, rows, stacked=True)
 
 
 def cost(ended: Outcome | None) -> str:

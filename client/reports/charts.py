@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from conoid.cases.figures import counted, percent
+from conoid.cases.figures import counted, percent, shared_unit
 from conoid.cases.messages import AnyMessage, Balance, Load
 
 from ..errors import ClientError
@@ -94,25 +94,28 @@ def balance_figure(balances: Course) -> Figure:
 
 
 def _outside(axes: Axes, balances: Course) -> None:
+    second, unit = shared_unit(balances.times, "s")
     last = balances.outside[-1]
     ranks = len(last)
     named = range(ranks) if ranks <= _NAMED else (last.index(max(last)), last.index(min(last)))
     for t in balances.cuts:
         axes.axvline(
-            1e6 * t, color=_FAINT, linewidth=0.8, linestyle=":", label="cut" if t == balances.cuts[0] else None
+            t / second, color=_FAINT, linewidth=0.8, linestyle=":", label="cut" if t == balances.cuts[0] else None
         )
     palette = iter(_RANKS)
     for rank in sorted(range(ranks), key=lambda r: r in named):
         points = [
-            (1e6 * t, row[rank]) for t, row in zip(balances.times, balances.outside, strict=True) if len(row) == ranks
+            (t / second, row[rank])
+            for t, row in zip(balances.times, balances.outside, strict=True)
+            if len(row) == ranks
         ]
         style: dict[str, Any] = (
             {"color": next(palette), "label": f"rank {rank}"} if rank in named else {"color": _FAINT}
         )
         axes.plot(*zip(*points, strict=True), linewidth=1.5 if rank in named else 0.7, **style)
-    axes.set(xlabel="time, µs", ylabel="outside nodes", ylim=(0, None), xlim=(0, None))
-    told_of = f"surface nodes: {counted(len(balances.cuts), 'cut')} on {counted(ranks, 'rank')}"
-    axes.set_title(told_of if ranks else "no parts in contact")
+    axes.set(xlabel=f"time, {unit}", ylabel="outside nodes", ylim=(0, None), xlim=(0, None))
+    title = f"surface nodes: {counted(len(balances.cuts), 'cut')} on {counted(ranks, 'rank')}"
+    axes.set_title(title if ranks else "no parts in contact")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8, frameon=False)
 

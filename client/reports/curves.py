@@ -10,7 +10,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from conoid.cases.figures import counted, exact
+from conoid.cases.figures import counted, exact, shared_unit
 from conoid.cases.output import history
 from conoid.cases.output.fragments import DUST
 
@@ -51,26 +51,41 @@ def energy(course: Columns) -> Figure:
     """
     parts = {name: _largest(some) for name, some in by_part(course).items()}
     figure, (left, middle, right, *others) = _panels(3 + len(parts))
-    t = _micro(course)
-    left.plot(t, course.numbers("kinetic"), color="#4c78a8", label="kinetic", linewidth=1.4)
+    _balance(left, course)
+    terms = {name: course.numbers(name) for name in _LEDGER if name in course and any(course.numbers(name))}
+    _energies(middle, course, terms, "without the kinetic term")
+    times, label = _time(course)
+    positive = [value if value > 0.0 else math.nan for value in course.numbers("residual")]
+    right.semilogy(times, positive, color=_INK, linewidth=1.2)
+    _name(right, "residual of the ledger", "relative to the largest energy input", label)
+    for axes, (name, some) in zip(others, parts.items(), strict=True):
+        _energies(axes, course, some, f"{name} energy of each part")
+    return figure
+
+
+def _balance(axes: Axes, course: Columns) -> None:
+    """Draws the kinetic energy, the energy that came in, and the sum of all terms."""
     came = [a + b for a, b in zip(course.numbers("initial"), course.numbers("external"), strict=True)]
-    left.plot(t, came, color=_INK, label="initial + external", linewidth=1.4)
     there = ("kinetic", *(name for name in _LEDGER if name in course))
     total = [math.fsum(values) for values in zip(*(course.numbers(name) for name in there), strict=True)]
-    left.plot(t, total, color="#e45756", label="sum of all terms", linewidth=1.0, linestyle="--")
-    for name, colour in zip(_LEDGER, _COLOURS, strict=False):
-        if name in course and any(course.numbers(name)):
-            middle.plot(t, course.numbers(name), color=colour, label=name, linewidth=1.4)
-    positive = [value if value > 0.0 else math.nan for value in course.numbers("residual")]
-    right.semilogy(t, positive, color=_INK, linewidth=1.2)
-    _name(left, "energy", "energy, J", ylim=(0, None))
-    _name(middle, "without the kinetic term", "energy, J")
-    _name(right, "residual of the ledger", "relative to the largest energy input")
-    for axes, (name, some) in zip(others, parts.items(), strict=True):
-        for (part, values), colour in zip(some.items(), _COLOURS * len(some), strict=False):
-            axes.plot(t, values, color=colour, label=part, linewidth=1.4)
-        _name(axes, f"{name} energy of each part", "energy, J")
-    return figure
+    times, label = _time(course)
+    worth, unit = shared_unit([*came, *total], "J")
+    curves = (
+        ("kinetic", course.numbers("kinetic"), "#4c78a8", "-"), ("initial + external", came, _INK, "-"),
+        ("sum of all terms", total, "#e45756", "--"),
+    )  # fmt: skip
+    for name, values, colour, dash in curves:
+        axes.plot(times, [value / worth for value in values], dash, color=colour, label=name, linewidth=1.3)
+    _name(axes, "energy", f"energy, {unit}", label, ylim=(0, None))
+
+
+def _energies(axes: Axes, course: Columns, curves: Mapping[str, Sequence[float]], title: str) -> None:
+    """Draws energies in one unit, each with a colour of its own."""
+    times, label = _time(course)
+    worth, unit = shared_unit([value for values in curves.values() for value in values], "J")
+    for (name, values), colour in zip(curves.items(), _COLOURS * len(curves), strict=False):
+        axes.plot(times, [value / worth for value in values], color=colour, label=name, linewidth=1.4)
+    _name(axes, title, f"energy, {unit}", label)
 
 
 def _largest(curves: dict[str, Sequence[float]]) -> dict[str, Sequence[float]]:
@@ -84,13 +99,15 @@ def steps(course: Columns) -> Figure:
     figure, (axes,) = _panels(1)
     held = [_limiter(text) for text in course["limiter"] if isinstance(text, str)] or [""] * course.rows
     often = sorted(set(held), key=lambda name: -held.count(name))[:_LIMITERS]
-    points = list(zip(_micro(course), course.numbers("dt"), held, strict=True))
-    axes.plot([t for t, _, _ in points], [1e9 * dt for _, dt, _ in points], color=_FAINT, linewidth=0.7)
+    times, label = _time(course)
+    worth, unit = shared_unit(course.numbers("dt"), "s")
+    points = list(zip(times, [dt / worth for dt in course.numbers("dt")], held, strict=True))
+    axes.plot([t for t, _, _ in points], [dt for _, dt, _ in points], color=_FAINT, linewidth=0.7)
     for name, colour in zip((*often, "others"), (*_COLOURS[:_LIMITERS], _FAINT), strict=False):
-        some = [(t, 1e9 * dt) for t, dt, by in points if by == name or (name == "others" and by not in often)]
+        some = [(t, dt) for t, dt, by in points if by == name or (name == "others" and by not in often)]
         if some:
             axes.plot(*zip(*some, strict=True), ".", markersize=3, color=colour, label=name or "not known")
-    _name(axes, "time step, coloured by its limiter", "dt, ns", ylim=(0, None))
+    _name(axes, "time step, coloured by its limiter", f"dt, {unit}", label, ylim=(0, None))
     return figure
 
 
@@ -110,13 +127,14 @@ def fragments(tables: Sequence[Columns]) -> Figure:
         raise ClientError("the run has no tables of fragments, because no part of it can break")
     figure, (left, right) = _panels(2)
     counted = [table for table in tables if table.rows]
-    t = [1e6 * table.numbers("t")[0] for table in counted]
+    worth, unit = shared_unit([table.numbers("t")[0] for table in counted], "s")
+    t = [table.numbers("t")[0] / worth for table in counted]
     whole = [sum(tets >= DUST for tets in table.numbers("tets")) for table in counted]
     left.plot(t, [table.rows for table in counted], ".-", color=_COLOURS[0], label="all")
     left.plot(t, whole, ".-", color=_COLOURS[1], label=f"of {DUST} tets or more")
     left.set_yscale("symlog", linthresh=1.0)
     distribution(right, {"": counted[-1]})
-    _name(left, "fragments", "number", ylim=(0, None))
+    _name(left, "fragments", "number", f"time, {unit}", ylim=(0, None))
     return figure
 
 
@@ -129,7 +147,7 @@ def distribution(axes: Axes, tables: Mapping[str, Columns]) -> None:
         axes.step(masses, range(1, len(masses) + 1), where="post", color=colour, label=label, linewidth=1.4)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    _name(axes, "N(m): fragments of mass m or more", "N", xlabel="m, g")
+    _name(axes, "N(m): fragments of mass m or more", "N", "m, g")
 
 
 def columns(course: Columns, names: Sequence[str] = ()) -> Figure:
@@ -151,14 +169,24 @@ def overlaid(runs: Mapping[str, Columns], names: Sequence[str], spare: int = 0) 
     groups = _by_unit(runs, names)
     figure, panels = _panels(len(groups) + spare)
     for (unit, some), axes in zip(groups.items(), panels, strict=False):
-        for name, colour in zip(some, _COLOURS * len(some), strict=False):
-            for course, dash in zip(runs.values(), _DASHES, strict=False):
-                if name in course:
-                    label = name if course is next(iter(runs.values())) else None
-                    axes.plot(_micro(course), course.numbers(name), dash, color=colour, label=label, linewidth=1.3)
         what = ", ".join(some) if len(some) < 4 else f"{some[0]}, {some[1]} and {len(some) - 2} more"
-        _name(axes, what if len(runs) == 1 else _dashed(runs), unit or "1")
+        _overlay(axes, runs, some, unit, what if len(runs) == 1 else _dashed(runs))
     return figure
+
+
+def _overlay(axes: Axes, runs: Mapping[str, Columns], names: Sequence[str], unit: str, title: str) -> None:
+    """Draws columns with equal units of several runs."""
+    curves = [course.numbers(name) for name in names for course in runs.values() if name in course]
+    worth, unit = shared_unit([value for curve in curves for value in curve], unit)
+    second, when = shared_unit([t for course in runs.values() for t in course.numbers("t")], "s")
+    for name, colour in zip(names, _COLOURS * len(names), strict=False):
+        for (run, course), dash in zip(runs.items(), _DASHES, strict=False):
+            if name in course:
+                key = name if run == next(iter(runs)) else None
+                times = [t / second for t in course.numbers("t")]
+                values = [value / worth for value in course.numbers(name)]
+                axes.plot(times, values, dash, color=colour, label=key, linewidth=1.3)
+    _name(axes, title, unit or "1", f"time, {when}")
 
 
 def _dashed(runs: Mapping[str, Columns]) -> str:
@@ -202,7 +230,7 @@ def _panels(n: int) -> tuple[Figure, list[Axes]]:
     return figure, every[:n]
 
 
-def _name(axes: Axes, title: str, ylabel: str, xlabel: str = "time, µs", **limits: Any) -> None:
+def _name(axes: Axes, title: str, ylabel: str, xlabel: str, **limits: Any) -> None:
     axes.set(xlabel=xlabel, ylabel=ylabel, **limits)
     axes.set_title(title, fontsize=10, color=_INK)
     axes.spines[["top", "right"]].set_visible(False)
@@ -210,5 +238,7 @@ def _name(axes: Axes, title: str, ylabel: str, xlabel: str = "time, µs", **limi
         axes.legend(fontsize=8, frameon=False)
 
 
-def _micro(course: Columns) -> list[float]:
-    return [1e6 * t for t in course.numbers("t")]
+def _time(course: Columns) -> tuple[list[float], str]:
+    """Returns the times of a history in a unit that suits them, and the label of the axis."""
+    worth, unit = shared_unit(course.numbers("t"), "s")
+    return [t / worth for t in course.numbers("t")], f"time, {unit}"

@@ -8,16 +8,32 @@ from importlib import metadata
 from conoid.cases.figures import count, counted, crew, duration, exacts, percent, rough, si
 from conoid.cases.outcome import Outcome
 
+_NUMBERS = ("value", "expected", "tolerance", "deviation")
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """Returns an HTML table with escaped text; ``numbers``: indices of the columns that are aligned to the right."""
+
+def table(
+    head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = (), stacked: bool = False
+) -> str:
+    """Returns an HTML table with escaped text. ``numbers``: indices of the columns that are aligned to the right.
+    ``stacked``: on a narrow window, a row becomes a list of names and values.
+    """
 
     def cells(row: Sequence[str], tag: str) -> str:
         return "".join(f"<{tag}{' class=n' * (i in numbers)}>{escape(each)}</{tag}>" for i, each in enumerate(row))
 
+    def line(row: Sequence[str]) -> str:
+        if not stacked:
+            return f"<tr>{cells(row, 'td')}</tr>"
+        return f"<tr>{''.join(cell(name, escape(each)) for name, each in zip(head, row, strict=True))}</tr>"
+
     top = f"<thead><tr>{cells(head, 'th')}</tr></thead>" if any(head) else ""
-    lines = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in rows)
-    return f"<div class=wide-table tabindex=0><table>{top}<tbody>{lines}</tbody></table></div>"
+    kind = " class=stacked" if stacked else ""
+    return f"<div class=wide-table tabindex=0><table{kind}>{top}<tbody>{''.join(map(line, rows))}</tbody></table></div>"
+
+
+def cell(name: str, body: str, kind: str = "") -> str:
+    """Returns a cell of a stacked table with the name of its column; ``body`` is HTML."""
+    return f'<td{f" class={kind}" if kind else ""} data-name="{escape(name)}">{body}</td>'
 
 
 def image(data: bytes, kind: str, alt: str) -> str:
@@ -54,10 +70,11 @@ def references(ended: Outcome | None) -> str:
         verdict = "<span class=good>pass</span>" if check.passed else "<span class=bad>FAIL</span>"
         value, expected, tolerance = exacts((check.value, check.expected, check.tolerance), check.unit)
         off = percent((check.value - check.expected) / abs(check.expected)) if check.expected else "–"
-        values = (value, expected, f"± {tolerance}", off)
-        cells = "".join(f"<td class=n>{escape(each)}</td>" for each in values)
-        rows.append(f"<tr><td>{escape(check.name)}</td>{cells}<td>{verdict}</td><td>{escape(check.source)}</td></tr>")
-    head = "".join(f"<th class=n>{each}</th>" for each in ("value", "expected", "tolerance", "deviation"))
-    head = f"<th>reference</th>{head}<th></th><th>source</th>"
+        values = zip(_NUMBERS, (value, expected, f"± {tolerance}", off), strict=True)
+        cells = "".join(cell(name, escape(each), "n") for name, each in values)
+        source = cell("source", escape(check.source))
+        rows.append(f"<tr>{cell('reference', escape(check.name))}{cells}{cell('result', verdict)}{source}</tr>")
+    head = "".join(f"<th class=n>{each}</th>" for each in _NUMBERS)
+    head = f"<th>reference</th>{head}<th>result</th><th>source</th>"
     lines = f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody>"
-    return f'<div class="wide-table sources" tabindex=0><table>{lines}</table></div>'
+    return f'<div class="wide-table sources" tabindex=0><table class=stacked>{lines}</table></div>'

@@ -20,7 +20,9 @@ from . import html
 _SHOTS = 3
 """Number of frames in which a field is drawn, evenly spaced over the run. Chosen value: three pictures fit side by
 side."""
-_SIZE = (1500, 860)
+_SIZE = (1300, 745)
+_CHART, _LETTERS = (4.6, 3.0), 9
+"""Size of each chart, inches, and of its texts, points. Chosen values: on a card of 400 px a text has 11 px."""
 _INK, _FAINT = "#1d2733", "#b5bcc4"
 """Colours of text and faint lines in charts. A report replaces these colours by its own text colours, so that a
 chart is readable on a light and on a dark background."""
@@ -144,19 +146,12 @@ def charts(draw: Callable[[], Any]) -> list[str]:
 def _svg(figure: Any, panel: Any) -> str:
     import matplotlib as mpl
 
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
-    figure.patch.set_visible(False)
-    for each in figure.axes:
-        each.set_visible(each is panel)
-        each.patch.set_visible(False)
+    _alone(figure, panel)
     title = panel.get_title()
     panel.set_title("")
-    if (legend := panel.get_legend()) is not None:
-        legend.get_frame().set_alpha(0.0)
     text = io.StringIO()
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": f"conoid{title}"}):
-        figure.savefig(text, format="svg", bbox_inches="tight", transparent=True, metadata={"Date": None})
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
     body = text.getvalue()
     body = re.sub(r"<metadata>.*?</metadata>", "", body[body.index("<svg") :], flags=re.DOTALL)
     for colour in (_INK, "#000000"):
@@ -167,3 +162,21 @@ def _svg(figure: Any, panel: Any) -> str:
         r'<svg[^>]*?viewBox="([^"]*)"[^>]*>', rf'<svg viewBox="\1" role=img aria-label="{escape(title)}">', body
     )
     return f"<h2>{escape(title)}</h2>{body}"
+
+
+def _alone(figure: Any, panel: Any) -> None:
+    """Leaves one panel in a figure, which gets the size of all charts of a report."""
+    for each in figure.axes:
+        each.set_visible(each is panel)
+        each.set_in_layout(each is panel)
+    panel.set_subplotspec(figure.add_gridspec(1, 1)[0, 0])
+    figure.set_size_inches(*_CHART)
+    figure.patch.set_visible(False)
+    panel.patch.set_visible(False)
+    panel.tick_params(labelsize=_LETTERS)
+    for label in (panel.xaxis.label, panel.yaxis.label):
+        label.set_size(_LETTERS)
+    if (legend := panel.get_legend()) is not None:
+        legend.get_frame().set_alpha(0.0)
+        for text in legend.get_texts():
+            text.set_size(_LETTERS)

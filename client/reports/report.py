@@ -20,9 +20,13 @@ _SHEETS = ("style.css", "run.css", "body.css")
 _STYLE = """
 :root { color-scheme: light dark }
 main { max-width: 1880px; margin: 0 auto }
-.plain { position: static; height: auto } .plain > .card { height: auto }
-.charts > .card.wide { grid-column: 1 / -1 }
-.plates { display: grid; gap: 12px; grid-template-columns: repeat(auto-fit, minmax(min(100%, 560px), 1fr)) }
+.stage, .now { height: max(420px, calc(100dvh - var(--top) - 92px)) }
+.now { overflow: auto } .now > .card { flex: none } .now table { font-size: 13px }
+.now th, .now td { padding-right: 9px } .now td:last-child { padding-right: 0 }
+.plain, .plain + .now { position: static; height: auto } .plain > .card { height: auto }
+.sheets { columns: 3 390px; column-gap: 12px } .sheets table { width: 100% } .sheets td:last-child { padding-right: 0 }
+.sheets > .card { break-inside: avoid; margin-bottom: 12px; padding: 12px 14px }
+.plates { display: grid; gap: 12px; grid-template-columns: repeat(auto-fit, minmax(min(100%, 380px), 1fr)) }
 .plate { margin: 0 } .plate img { display: block; width: 100%; height: auto }
 .plate figcaption { display: flex; flex-wrap: wrap; align-items: center; gap: 4px 10px; font-size: 13.5px }
 .scale { display: inline-flex; align-items: center; gap: 8px; color: var(--soft) }
@@ -33,13 +37,18 @@ table { border-collapse: collapse; margin: 2px 0 8px; font-size: 14px } .wide-ta
 th { text-align: left; font-weight: 500; font-size: 13px; color: var(--soft) }
 th, td { padding: 5px 14px 5px 0; vertical-align: top } tbody tr { border-top: 1px solid var(--line) }
 td.n, th.n { text-align: right; white-space: nowrap } td { overflow-wrap: break-word }
-td:first-child { min-width: 6em } .sources td:last-child { min-width: 15em }
+.sources td:first-child { min-width: 6em } .sources td:last-child { min-width: 15em }
 .digest { overflow-wrap: anywhere; font: 12.5px var(--mono) }
 span.good, span.bad { font-weight: 600 } summary { cursor: pointer }
 .now p { margin: 0 0 8px } .log { max-height: 420px }
+@media (max-width: 959px) { .stage, .now { height: auto } .now .warnings { max-height: none } }
+@media (max-width: 760px) {
+  .stacked td.n { text-align: left; white-space: normal } .sources td:last-child { min-width: 0 }
+  th, td { padding-right: 8px } table { font-size: 13px }
+}
 @media print {
-  .bench { grid-template-columns: 1fr } .stage { position: static; height: 480px } .plain { height: auto }
-  .card { break-inside: avoid; box-shadow: none } .log { max-height: none }
+  .bench { grid-template-columns: 1fr } .stage { position: static; height: 480px } .plain, .now { height: auto }
+  .card { break-inside: avoid; box-shadow: none } .log, .warnings { max-height: none }
   .tools3d, .controls, .scrub { display: none !important } .top { position: static }
 }
 """
@@ -68,17 +77,19 @@ def write(
     stage = replay3d.html(result)
     say("pictures")
     drawn = pictures.pictures(result, shown, at)
-    pictured = _card("Pictures", f'<div class="plates">{drawn}</div>' if drawn else "", wide=True)
-    about = _card("Case", cards.case(case), wide=True)
+    pictured = _card("Pictures", f'<div class="plates">{drawn}</div>' if drawn else "")
+    about = _card("Case", cards.case(case))
     kind = "stage" if stage else "stage plain"
     first, *others = filter(None, [stage, pictured, about])
     body = "".join([
         _head(result.folder.name, title, str(case.get("name", "")), ended),
-        f'<div class="bench"><div class="{kind}">{first}</div><div class="now">{_now(ended)}</div></div>',
-        '<div class="cards charts">', _card("References", cards.references(ended), wide=True), *others,
-        _charts(result, ended, say),
-        _card("Messages", cards.messages(result) if _has_journal(result) else "", wide=True),
-        _card("All keys of the case", cards.keys(case), wide=True), "</div>",
+        f'<div class="bench"><div class="{kind}">{first}</div>',
+        f'<div class="now" tabindex="0" role="region" aria-label="main numbers">{_now(ended)}</div></div>',
+        _card("References", cards.references(ended)), *others,
+        f'<div class="cards charts">{_charts(result, say)}</div>',
+        f'<div class="sheets">{_sheets(result, ended)}</div>',
+        _card("Messages", cards.messages(result) if _has_journal(result) else ""),
+        _card("All keys of the case", cards.keys(case)),
     ])  # fmt: skip
     save_text(out, _page(f"{title}: {result.folder.name}", body))
     return out
@@ -113,41 +124,34 @@ def _now(ended: Outcome | None) -> str:
     """Returns the column beside the 3-D view."""
     return "".join([
         _card("Run", cards.strip(ended)), _card("Warnings", cards.warnings(ended)),
-        _card("Results", cards.results(ended)),
+        _card("Results", cards.results(ended)), _card("Cost and error", cards.cost(ended)),
     ])  # fmt: skip
 
 
-def _charts(result: Result, ended: Outcome | None, say: Callable[[str], None]) -> str:
-    """Returns the charts and their tables."""
+def _charts(result: Result, say: Callable[[str], None]) -> str:
+    """Returns the charts, each on a card of its own."""
     say("energy")
-    found = [_card("Cost and error", cards.cost(ended)), *_energy(result, ended)]
+    found = pictures.curve(result, "energy")
     say("fragments")
-    if result.fragment_tables:
-        found += [*map(_chart, pictures.fragments(result)), _card("Fragments", cards.fragments(result))]
+    found += pictures.fragments(result) if result.fragment_tables else []
     say("time step and probes")
-    found += [
-        *map(_chart, pictures.curve(result, "steps")),
-        *map(_chart, pictures.curve(result, "columns")),
-    ]
+    found += [*pictures.curve(result, "steps"), *pictures.curve(result, "columns")]
     say("balance")
-    if _has_journal(result):
-        found += [
-            *map(_chart, pictures.balance(result)),
-            _card("Ranks and balance", cards.balance(result, ended)),
-        ]
-    return "".join(found)
+    found += pictures.balance(result) if _has_journal(result) else []
+    return "".join(f'<section class="card">{body}</section>' for body in found)
 
 
-def _energy(result: Result, ended: Outcome | None) -> list[str]:
-    return [*map(_chart, pictures.curve(result, "energy")), _card("Energy", cards.energy(result, ended))]
+def _sheets(result: Result, ended: Outcome | None) -> str:
+    """Returns the cards with tables, which have different heights."""
+    return "".join([
+        _card("Energy", cards.energy(result, ended)),
+        _card("Fragments", cards.fragments(result) if result.fragment_tables else ""),
+        _card("Ranks and balance", cards.balance(result, ended) if _has_journal(result) else ""),
+    ])  # fmt: skip
 
 
-def _chart(body: str) -> str:
-    return f'<section class="card">{body}</section>'
-
-
-def _card(title: str, body: str, wide: bool = False) -> str:
-    head = f'<section class="card{" wide" if wide else ""}"><div class="card-head"><h2>{escape(title)}</h2></div>'
+def _card(title: str, body: str) -> str:
+    head = f'<section class="card"><div class="card-head"><h2>{escape(title)}</h2></div>'
     return f"{head}{body}</section>" if body else ""
 
 

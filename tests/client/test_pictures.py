@@ -214,7 +214,7 @@ def test_a_fixed_range_is_that_of_the_run(frame: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("size", [(200, 200), (320, 240), (700, 500), (1280, 720), (1920, 1080), (500, 1400)])
 def test_no_text_is_cut_off_at_any_size(size: tuple[int, int]) -> None:
     """No text is drawn on the outermost pixels of a picture, for any field and any length of a name."""
-    font = picture_layout.font(size)
+    font = picture_layout.font(Look(size=size))
     right, above, towards = np.linalg.qr(np.random.default_rng(sum(size)).normal(size=(3, 3)))[0]
     eye = Camera(np.zeros(3), towards, right, above, half=0.05, deep=0.1)
     parts = ["a part with a much longer name than usual in a case", *map(str, range(60))]

@@ -17,7 +17,7 @@ from conoid.client.cli import app
 from conoid.client.commands import options, progress
 from conoid.client.errors import ClientError, UnfinishedError
 from conoid.client.local.atomic import save_text
-from conoid.client.reports import replay3d, report
+from conoid.client.reports import pictures, replay3d, report
 from conoid.client.result import Result
 from conoid.server.answers import page
 
@@ -170,7 +170,7 @@ def test_a_long_report_prints_its_progress(folder: Path, quiet_home: Path, monke
         return []
 
     monkeypatch.setattr(options, "complain", renderer)
-    monkeypatch.setattr(report, "_energy", energy)
+    monkeypatch.setattr(pictures, "curve", energy)
     done = CliRunner().invoke(app, ["report", str(folder), "--no-pictures"])
     assert done.exit_code == 0, done.output
     assert done.stdout == "bar.html\n", "scripts read no more than the file"
