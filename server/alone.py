@@ -30,7 +30,10 @@ def only_one(runs: Path) -> Iterator[None]:
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                raise AloneError(f"--runs {runs}: another server uses this folder") from None
+                raise AloneError(
+                    f"--runs {runs}: another server or 'conoid run' uses this folder; "
+                    "wait until it ends, or choose another folder"
+                ) from None
             except OSError:
                 if descriptor == file:
                     raise AloneError(f"--runs {runs}: this file system has no locks") from None

@@ -54,15 +54,19 @@ class LocalServer:
         self.runs.mkdir(parents=True, exist_ok=True)
         self.token = _token(self.runs)
         options = ["--port", "0", "--zenoh-port", "0", "--slots", str(self.slots), "--grace", str(GRACE)]
-        with (self.runs / LOG_FILE).open("wb") as log:
+        # Another server may use the folder and its log. This server writes a file of its own until it answers.
+        self._log = self.runs / f".{LOG_FILE}.{os.getpid()}"
+        with self._log.open("wb") as log:
             self._process = subprocess.Popen(
                 [*_TETHERED, str(os.getpid()), "--runs", str(self.runs), *options], stdin=subprocess.DEVNULL,
                 stdout=log, stderr=log, start_new_session=True, env=_environment(),
             )  # fmt: skip
         try:
             self.session = Session(self._await().url, self.token)
+            self._log.replace(self.runs / LOG_FILE)
         except BaseException:
             self.stop()
+            self._log.unlink(missing_ok=True)
             raise
         return self
 
@@ -80,12 +84,12 @@ class LocalServer:
         deadline = time.monotonic() + _START_SECONDS
         while time.monotonic() < deadline:
             if self._process.poll() is not None:
-                raise ClientError(f"the server did not start: {_last_line(self.runs / LOG_FILE)}")
+                raise ClientError(f"the server did not start: {_last_line(self._log)}")
             address = _address(self.runs / ADDRESS_FILE)
             if address is not None and address.pid == self._process.pid:
                 return address
             time.sleep(0.05)
-        raise ClientError(f"the server did not start within {duration(_START_SECONDS)}; see {self.runs / LOG_FILE}")
+        raise ClientError(f"the server did not start within {duration(_START_SECONDS)}: {_last_line(self._log)}")
 
     def stop(self) -> None:
         """Requests the server to end, and kills the server after a time limit."""

@@ -1,6 +1,7 @@
 // Requests to the server over REST and SSE, with the token of this tab. EventSource cannot send headers, so SSE is read
 // with fetch.
 
+import { Unanswered, answered } from "./away.js";
 import { token } from "./token.js";
 
 export { token };
@@ -21,7 +22,10 @@ const address = (path) => new URL(path, document.baseURI);
 
 export async function send(path, { method = "GET", headers = {}, body, signal, cache = "no-store" } = {}) {
   const shown = token.get() ? { Authorization: `Bearer ${token.get()}` } : {};
-  const response = await fetch(address(path), { method, headers: { ...shown, ...headers }, body, signal, cache });
+  const response = await fetch(address(path), { method, headers: { ...shown, ...headers }, body, signal, cache }).catch((error) => {
+    throw signal?.aborted ? error : new Unanswered();
+  });
+  answered();
   if (!response.ok) throw new Problem(response.status, await response.json().catch(() => null));
   return response;
 }

@@ -1,6 +1,7 @@
 // Router of the page, and form for signing in.
 
 import { Problem, call, token } from "./api.js";
+import { unanswered } from "./away.js";
 import { h } from "./figures.js";
 import { offer } from "./libraries.js";
 import { ComparePage } from "./compare.js";
@@ -82,8 +83,8 @@ async function route() {
 }
 
 function away(error) {
-  show({ element: h("section.card.missing", {}, h("h1", {}, "The server does not answer"), h("p.problem", { role: "status" }, `No answer from the server: ${error.message}`),
-    h("p.hint", {}, "The request is repeated every few seconds.")) });
+  show({ element: h("section.card.missing", {}, h("h1", {}, "The server does not answer"), h("p.problem", { role: "status" }, unanswered(error, "", AWAY)),
+    h("p.hint", {}, "The page opens as soon as the server answers. The runs go on without the server; ", h("code", {}, "conoid show FOLDER"), " reads the folder of a run.")) });
   again = setTimeout(start, AWAY);
 }
 

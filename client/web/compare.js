@@ -1,6 +1,7 @@
 // Page that compares several runs: their histories in common charts, keys that differ, results, bodies side by side.
 
 import { axis, largest, lineStyle, logarithmic, series, time } from "./axes.js";
+import { unanswered } from "./away.js";
 import { binary, call, refused } from "./api.js";
 import { Chart } from "./charts.js";
 import { called, common, differences, inWords, keyColumns, results } from "./differences.js";
@@ -57,7 +58,7 @@ export class ComparePage {
       this.units ??= await readUnits(this.runs[0].plan?.name, signal);
     } catch (error) {
       if (signal.aborted) return;
-      this.head.replaceChildren(h("h1", {}, `${this.ids.length} runs`), h("p.problem", {}, refused(error) ? error.message : `No answer from the server: ${error.message}`));
+      this.head.replaceChildren(h("h1", {}, `${this.ids.length} runs`), h("p.problem", {}, refused(error) ? error.message : unanswered(error, this.drawn ? "The runs are shown as they were read last." : "", this.again)));
       if (!refused(error)) this.later();
       return;
     }

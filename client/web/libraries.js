@@ -1,5 +1,7 @@
 // Loading of three.js and ECharts from the server; each library is loaded once, at its first use.
 
+import { Unanswered } from "./away.js";
+
 const known = {};
 
 // Returns the result of `read`, which is called once; after a failure it is called again.
@@ -9,7 +11,9 @@ const once = (name, read) => (known[name] ??= read().catch((error) => {
 }));
 
 // Returns { auth, problem, three, echarts }, the libraries of the server. The request needs no token.
-export const offer = () => once("offer", () => fetch(new URL("lib/index.json", document.baseURI)).then((answer) => answer.json()));
+export const offer = () => once("offer", () => fetch(new URL("lib/index.json", document.baseURI)).catch(() => {
+  throw new Unanswered();
+}).then((answer) => answer.json()));
 
 async function library(name) {
   const { [name]: place, problem } = await offer();

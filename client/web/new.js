@@ -1,6 +1,7 @@
 // Page for a new run: the case in an editor, the files that the case names, the check by the server, and the start.
 
 import { Problem, call, send } from "./api.js";
+import { unanswered } from "./away.js";
 import { isJson, lineOf, valueOf, withKey } from "./casetext.js";
 import { asToml } from "./casetoml.js";
 import { Editor } from "./editor.js";
@@ -212,7 +213,7 @@ export class NewPage {
   fail(error) {
     if (this.abort.signal.aborted) return;
     if (error.status === 401) this.onRefused();
-    else this.say(error instanceof Problem ? error.message : `No answer from the server: ${error.message}`);
+    else this.say(error instanceof Problem ? error.message : unanswered(error, "The text stays in the editor.", this.starting ? 0 : AGAIN));
   }
 
   say(text) { this.status.replaceChildren(text ? h("span.problem", {}, text) : ""); }

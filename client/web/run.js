@@ -89,7 +89,7 @@ export class RunPage {
     await this.readInfo();
     let filled = false;
     while (!this.abort.signal.aborted) {
-      let away = false;
+      let [away, lost] = [false, null];
       try {
         if (!filled) {
           await fill(live, this.info, this.abort.signal);
@@ -106,10 +106,10 @@ export class RunPage {
       } catch (error) {
         if (this.abort.signal.aborted) return;
         if (refused(error)) return this.fail(error);
-        away = true;
+        [away, lost] = [true, error];
       }
       if (FINAL.has(live.state)) break;
-      this.connection = ["waiting", away ? "server away, trying again" : "reconnecting"];
+      this.connection = ["waiting", away ? `${lost.message}, next request in ${Math.ceil(wait / 1000)} s` : "reconnecting"];
       this.later();
       await pause(wait);
       wait = Math.min(2 * wait, 8000);

@@ -1,6 +1,7 @@
 // Page of all runs: a table with sorting, filters and groups; marked runs can be compared.
 
 import { Problem, call, refused } from "./api.js";
+import { unanswered } from "./away.js";
 import { columnsOf } from "./columns.js";
 import { count, counted, exact, h, vector } from "./figures.js";
 import { Grid } from "./grid.js";
@@ -56,7 +57,7 @@ export class RunsPage {
       mark: (row, on, far) => this.mark(row, on, far), markAll: (rows, on) => this.markAll(rows, on),
     });
     this.element = h("div.runs-page", {}, h("div.page-head", {}, h("h1", {}, "Runs"), this.number), this.tools.element, this.note, this.grid.region);
-    this.grid.region.hidden = true;
+    this.grid.region.hidden = this.tools.element.hidden = true;
     this.say("Loading …");
   }
 
@@ -84,8 +85,11 @@ export class RunsPage {
       if (error instanceof Problem && error.status === 401) return this.onRefused();
       this.fail(error);
     }
-    this.next(this.table.pending ? 200 : this.open ? SOON : LATER);
+    this.next(this.wait);
   }
+
+  // Time in ms until the next request.
+  get wait() { return this.table.pending && !this.failed ? 200 : this.open ? SOON : LATER; }
 
   get open() { return [...this.table.rows.values()].some(({ state }) => !FINAL.has(state)); }
 
@@ -132,7 +136,8 @@ export class RunsPage {
 
   fail(error) {
     this.failed = true;
-    this.say(h("span.problem", {}, refused(error) ? error.message : `No answer from the server: ${error.message}`));
+    const left = this.table.rows.size ? "The runs are shown as they were read last; filters and sorting work." : "";
+    this.say(h("span.problem", {}, refused(error) ? error.message : unanswered(error, left, this.wait)));
   }
 
   say(...children) {

@@ -1,6 +1,7 @@
 // Page of a sweep: number of completed points, a result over the changed keys, and each point with its values.
 
 import { Problem, call, download, refused } from "./api.js";
+import { unanswered } from "./away.js";
 import { axis, crosses, largest, lineStyle, series } from "./axes.js";
 import { Chart } from "./charts.js";
 import { columnsOf } from "./columns.js";
@@ -85,7 +86,7 @@ export class SweepPage {
     } catch (error) {
       if (signal.aborted) return;
       if (error instanceof Problem && error.status === 401) return this.onRefused();
-      this.fail(refused(error) ? error.message : `No answer from the server: ${error.message}`);
+      this.fail(refused(error) ? error.message : unanswered(error, this.info ? "The points are shown as they were read last." : "", AGAIN));
       if (refused(error)) return;
     }
     if (!this.finished || this.pending) this.timer = setTimeout(() => this.read(), this.pending ? 300 : AGAIN);

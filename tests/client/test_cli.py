@@ -349,12 +349,14 @@ def test_watch_can_be_left(user: Path) -> None:
 
 def test_a_server_that_cannot_start_prints_the_reason(alone: Path) -> None:
     (alone / "runs").mkdir()
+    (alone / "runs" / "server.log").write_text("of the other server\n")
     with (alone / "runs" / "server.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         result = conoid("run", case_file(alone), "--out", alone / "runs")
     assert result.exit_code == 1
     assert "the server did not start: " in result.stderr
-    assert "another server uses this folder" in result.stderr
+    assert "another server or 'conoid run' uses this folder; wait until it ends" in result.stderr
+    assert [path.read_text() for path in (alone / "runs").glob("*server.log*")] == ["of the other server\n"]
 
 
 def test_run_refuses_a_wrong_case_before_anything_starts(alone: Path) -> None:

@@ -43,7 +43,7 @@ class Observer {
 const known = {};
 const stage = {
   document: { baseURI: "http://x/", title: "", addEventListener() {}, removeEventListener() {}, createElement: (tag) => new Element(tag), getElementById: (id) => (known[id] ??= new Element(id)), documentElement: new Element("html") },
-  location: { hash: "" }, sessionStorage: { getItem: () => "token", setItem() {}, removeItem() {} }, addEventListener() {},
+  location: { hash: "" }, sessionStorage: { getItem: () => "token", setItem() {}, removeItem() {} }, addEventListener() {}, removeEventListener() {},
   matchMedia: () => ({ addEventListener() {}, removeEventListener() {} }), getComputedStyle: () => ({ getPropertyValue: () => "" }),
   IntersectionObserver: Observer, ResizeObserver: Observer, requestAnimationFrame: (work) => setTimeout(work),
 };

@@ -151,7 +151,10 @@ def test_one_server_a_folder(process: MakeProcess) -> None:
         capture_output=True, text=True, timeout=60, check=False,
     )  # fmt: skip
     assert second.returncode == 1
-    assert second.stderr == f"conoid.server: --runs {first.runs}: another server uses this folder\n"
+    assert (
+        second.stderr == f"conoid.server: --runs {first.runs}: another server or 'conoid run' uses this folder; "
+        "wait until it ends, or choose another folder\n"
+    )
     assert first.end(signal.SIGINT) == 0
 
 

@@ -3,6 +3,7 @@ than the page shows.
 """
 
 import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -57,7 +58,9 @@ def test_libraries_are_requested_again_after_a_missing_answer(web: Path) -> None
         state.served = () => ({ three: place });
         return [first, (await three()).ready];
     """
-    assert played(web, script) == ["away", True]
+    message, ready = played(web, script)
+    assert re.fullmatch(r"the server does not answer since \d\d:\d\d:\d\d", message)
+    assert ready
 
 
 def test_a_page_that_was_left_changes_no_title(web: Path) -> None:
@@ -105,7 +108,7 @@ def test_runs_are_compared_when_the_server_comes_back(web: Path) -> None:
         const after = text(page.element);
         page.close();
         const shown = ["3 runs", "Add a chart", "Values that differ"].every((words) => after.includes(words));
-        return [before.includes("away"), shown];
+        return [before.includes("The server does not answer since"), shown];
     """
     assert played(web, script % json.dumps(RUN)) == [True, True]
 
@@ -373,7 +376,7 @@ def test_a_case_is_checked_when_typing_stops_and_started_once(web: Path) -> None
     """
     checks, before, after, status, keys, starts, place = played(web, script)
     assert (checks, before, after) == (["abc"], True, False)
-    assert "No answer from the server" in status
+    assert re.match(r"The server does not answer since [0-9:]{8}\. The text stays in the editor\.", status)
     assert (keys, starts) == (2, 3), "the same case has the same key, another one another"
     assert place == "#/runs/b"
 
@@ -431,3 +434,32 @@ def test_a_closed_chart_and_the_one_beside_the_body_are_the_same_at_the_next_vis
     assert played(web, script) == [
         ["energy", "dt,counts", "Closed"], ["counts", "energy", "Closed + dt"], ["", "energy", "Closed + dt + counts"],
     ]  # fmt: skip
+
+
+def test_the_list_states_that_the_server_does_not_answer_and_what_works(web: Path) -> None:
+    """Before the first answer there is no toolbar; afterwards the runs stay, and the text ends with an answer."""
+    script = """
+        const { RunsPage } = await load("runs.js");
+        const page = new RunsPage();
+        await pause(20);
+        const first = [page.tools.element.hidden, text(page.note)];
+        state.served = (path) => (path === "v1/table" ? LISTED : { sweeps: [], next: null });
+        await page.turn();
+        state.served = () => { throw new Error("away"); };
+        await page.turn();
+        const second = [page.tools.element.hidden, text(page.note)];
+        state.served = (path) => (path === "v1/table" ? LISTED : { sweeps: [], next: null });
+        await page.turn();
+        page.close();
+        return [first, second, page.note.hidden];
+    """.replace("LISTED", listing(json.dumps(RUN)))
+    first, second, silent = played(web, script)
+    away = r"The server does not answer since [0-9:]{8}\."
+    again = r"The request is repeated every 6 s\."
+    assert first[0]
+    assert re.fullmatch(f"{away} {again}", first[1])
+    assert not second[0]
+    assert re.fullmatch(
+        rf"{away} The runs are shown as they were read last; filters and sorting work\. {again}", second[1]
+    )
+    assert silent
