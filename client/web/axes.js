@@ -62,7 +62,7 @@ const rule = () => ({ lineStyle: { color: colour("line") } });
 export const label = (formatter) => ({ color: colour("soft"), fontSize: FONT, hideOverlap: true, formatter });
 
 export const time = (end, more = {}) => ({
-  type: "value", min: 0, max: end, axisLine: { ...rule(), onZero: false }, splitLine: { show: false }, axisLabel: label(onAxis(end, "s")),
+  type: "value", min: 0, max: end, splitNumber: 4, axisLine: { ...rule(), onZero: false }, splitLine: { show: false }, axisLabel: label(onAxis(end, "s")),
   axisPointer: { label: { show: false, formatter: ({ value }) => exact(Number(value), "s", 4) } }, ...more,
 });
 
