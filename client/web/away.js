@@ -8,7 +8,7 @@ let since = null;
 export class Unanswered extends Error {
   constructor() {
     since ??= Date.now();
-    super(`the server does not answer since ${clock(since / 1000)}`);
+    super(`the server has not answered since ${clock(since / 1000)}`);
   }
 }
 

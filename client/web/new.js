@@ -54,7 +54,7 @@ export class NewPage {
     this.gallery = h("select", { "aria-label": "start from a shipped case", onchange: () => this.take(this.gallery.value) }, h("option", { value: "" }, "a shipped case …"));
     const chosen = h("input", { type: "file", multiple: "", "aria-label": "choose a case and its files", onchange: () => this.drop([...chosen.files]) });
     this.fields = FIELDS.map(([id, words, table, name]) => {
-      const input = h("input", { type: table ? "number" : "text", min: 1, id: `new-${id}`, placeholder: { ranks: "1", threads: "all cores" }[id] ?? "", oninput: () => this.set(table, name, input) });
+      const input = h("input", { type: table ? "number" : "text", min: 1, id: `new-${id}`, placeholder: { ranks: "1", threads: "all" }[id] ?? "", oninput: () => this.set(table, name, input) });
       return { input, table, name, element: h(`label.form-row.of-${id}`, {}, h("span", {}, words), input) };
     });
     this.labels = h("input", { type: "text", placeholder: "study=speeds, mesh=fine" });

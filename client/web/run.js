@@ -275,6 +275,7 @@ export class RunPage {
     const { state, message, snapshots } = this.live;
     this.empty.hidden = snapshots.length > 0;
     if (this.empty.hidden) return;
+    this.empty.className = `card empty-stage${FINAL.has(state) ? " brief" : ""}`;
     const text = FINAL.has(state) ? "This run has no snapshot." : STAGES[state] ?? "The first snapshot will be shown here.";
     const more = state === "queued" ? this.info.reason : message;
     this.empty.replaceChildren(h("div", {}, h("p", {}, text), FINAL.has(state) ? "" : h("p.hint", {}, more)));

@@ -297,4 +297,4 @@ function ranges(rows, columns) {
 
 const beginning = () => h("div.empty", {}, h("h2", {}, "No runs yet"),
   h("p", {}, h("a", { href: "#/new?case=taylor_copper" }, "Start from a shipped case"), " on this page, or from a terminal:"),
-  h("pre", {}, h("code", {}, "conoid cases                      # the shipped cases\nconoid submit taylor_copper       # submits one; it appears here\nconoid sweep taylor_copper --set \"parts[0].velocity[2]=-150 m/s,-200 m/s\"")));
+  h("pre", {}, h("code", {}, "# the shipped cases\nconoid cases\n# submits one; it appears here\nconoid submit taylor_copper\n# a run for each value\nconoid sweep taylor_copper --set \"parts[0].velocity[2]=-150 m/s,-200 m/s\"")));

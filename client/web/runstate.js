@@ -5,6 +5,7 @@ import { call, tail } from "./api.js";
 import { h, rough, si, words } from "./figures.js";
 import { ended } from "./numbers.js";
 
+const LOGS = { 0: "log/rank-0.log", launcher: "log/launcher.log" };
 const LINES = 12; // Number of lines of the log that are shown.
 const CAUSES = {
   input: "its case cannot be run", mesh: "its mesh cannot be made", diverged: "its solution has diverged", energy: "its energy does not close",
@@ -48,7 +49,8 @@ export class RunState {
     const actions = h("div.actions");
     this.element.replaceChildren(h("div", {}, h("h2", {}, sentence(live)), live.message ? h("p", {}, live.message) : "",
       h("p.hint", {}, reached(live, outcome)), advice(live.cause, outcome), actions), log);
-    const [files, lines] = await Promise.all([this.files(), this.end(live)]);
+    const files = await this.files();
+    const lines = await this.end(live, files);
     if (turn !== this.turn) return;
     const point = FATED.has(live.cause) ? null : files?.filter(({ path }) => POINT.test(path)).at(-1);
     if (point) actions.append(this.restart(Number(POINT.exec(point.path)[1]), live));
@@ -74,9 +76,12 @@ export class RunState {
     return button;
   }
 
-  // Returns the end of the first log that has text: the log of the launcher if no rank started, else of rank 0.
-  async end(live) {
-    for (const name of live.progress ? ["0", "launcher"] : ["launcher", "0"]) {
+  // Returns the end of the first log that has text: the log of the launcher if no rank started, else of rank 0. Files
+  // that do not exist are not requested, because a browser logs an answer 404 as an error of the page.
+  async end(live, files) {
+    const there = new Set(files?.map(({ path }) => path));
+    const logs = live.progress ? ["0", "launcher"] : ["launcher", "0"];
+    for (const name of logs.filter((one) => !files || there.has(LOGS[one]))) {
       const text = (await tail(this.run, name).catch(() => "")).trimEnd();
       if (text) return text.split("\n").slice(-LINES).join("\n");
     }

@@ -59,7 +59,7 @@ def test_libraries_are_requested_again_after_a_missing_answer(web: Path) -> None
         return [first, (await three()).ready];
     """
     message, ready = played(web, script)
-    assert re.fullmatch(r"the server does not answer since \d\d:\d\d:\d\d", message)
+    assert re.fullmatch(r"the server has not answered since \d\d:\d\d:\d\d", message)
     assert ready
 
 
@@ -108,7 +108,7 @@ def test_runs_are_compared_when_the_server_comes_back(web: Path) -> None:
         const after = text(page.element);
         page.close();
         const shown = ["3 runs", "Add a chart", "Values that differ"].every((words) => after.includes(words));
-        return [before.includes("The server does not answer since"), shown];
+        return [before.includes("The server has not answered since"), shown];
     """
     assert played(web, script % json.dumps(RUN)) == [True, True]
 
@@ -376,7 +376,7 @@ def test_a_case_is_checked_when_typing_stops_and_started_once(web: Path) -> None
     """
     checks, before, after, status, keys, starts, place = played(web, script)
     assert (checks, before, after) == (["abc"], True, False)
-    assert re.match(r"The server does not answer since [0-9:]{8}\. The text stays in the editor\.", status)
+    assert re.match(r"The server has not answered since [0-9:]{8}\. The text stays in the editor\.", status)
     assert (keys, starts) == (2, 3), "the same case has the same key, another one another"
     assert place == "#/runs/b"
 
@@ -454,7 +454,7 @@ def test_the_list_states_that_the_server_does_not_answer_and_what_works(web: Pat
         return [first, second, page.note.hidden];
     """.replace("LISTED", listing(json.dumps(RUN)))
     first, second, silent = played(web, script)
-    away = r"The server does not answer since [0-9:]{8}\."
+    away = r"The server has not answered since [0-9:]{8}\."
     again = r"The request is repeated every 6 s\."
     assert first[0]
     assert re.fullmatch(f"{away} {again}", first[1])
