@@ -16,12 +16,16 @@ from llvmlite import ir
 
 from ..kernels.jit import intrinsic, packed, several, types
 from ..model.growing import address_of
-from .array_words import ALONE, LAST, NUMBER, name_of, write_leaves, write_values
+from .array_words import ALONE, AXES, FLAG, INTEGER, LAST, OBJECTS, REAL, name_of, write_leaves, write_values
 
 _WORD, _BIT = ir.IntType(64), ir.IntType(1)
 """LLVM types: a word of a table, and a flag."""
-_ARRAY = id(np.ndarray)
-"""Address of the type of arrays."""
+_OBJECTS = address_of(OBJECTS)
+"""Address of the types and constants that the kernels of array_words.py know."""
+
+
+_NUMBERS = {types.float64: REAL, types.boolean: FLAG}
+"""Kinds of leaves that are numbers, except integers."""
 
 
 class Follow(NamedTuple):
@@ -62,15 +66,15 @@ class Arguments:
         self._values: tuple[Any, ...] = ()
         """Values of the last call of ``set``."""
         self._sizes, self._sizes_at = np.zeros(0, np.int64), 0
-        self._all_numbers = [k for k, kind in enumerate(self._kinds) if not isinstance(kind, types.Array)]
-        self._numbers: list[tuple[int, int, int]] = []
-        """Numbers and flags among the values of ``set``: number of the leaf; number of the value; number of the field,
-        -1 if the value is no record."""
+        self._all_integers = np.flatnonzero(self._leaves[:, AXES] == INTEGER).tolist()
+        self._integers: list[tuple[int, int, int]] = []
+        """Integers among the values of ``set``: number of the leaf; number of the value; number of the field, -1 if the
+        value is no record."""
 
     def _leaf(self, k: int, kind: Any) -> tuple[int, ...]:
         """Return the description of leaf number ``k``; see array_words.py."""
         if not isinstance(kind, types.Array):
-            return self.place(k), NUMBER, 0, 0, 0
+            return self.place(k), _NUMBERS.get(kind, INTEGER), 0, 0, 0
         return self.place(k), kind.ndim, int(_is_strided(kind)), name_of(_dtype(kind)), 0
 
     def set(self, *values: Any) -> int:
@@ -82,10 +86,10 @@ class Arguments:
         """
         if len(values) != len(self._values):
             self._divide(values)
-        if not write_values(self._leaves_at, self._sizes_at, id(values), len(values), _ARRAY):
+        if not write_values(self._leaves_at, self._sizes_at, id(values), len(values), _OBJECTS):
             self._write_all(values)
-        for k, of, field in self._numbers:
-            self._put_number(k, values[of] if field < 0 else values[of][field])
+        for k, of, field in self._integers:
+            self._words[self._places[k]] = int(values[of] if field < 0 else values[of][field])
         self._values = values
         return self.address
 
@@ -95,17 +99,17 @@ class Arguments:
         self._sizes = np.array(sizes, np.int64)
         self._sizes_at = address_of(self._sizes)
         fields = [(of, field) for of, size in enumerate(sizes) for field in (range(size) if size >= 0 else (-1,))]
-        self._numbers = [(k, *at) for k, at in enumerate(fields) if not isinstance(self._kinds[k], types.Array)]
+        self._integers = [(k, *at) for k, at in enumerate(fields) if k in self._all_integers]
 
     def _write_all(self, values: tuple[Any, ...]) -> None:
-        """Write all arrays by numpy's functions. ``set`` calls this method if an array is of a subclass, or of a type
-        that equals the declared one but has another number in numpy. Raises ValueError if the type differs.
+        """Write all leaves in Python. ``set`` calls this method if an array is of a subclass, or of a type that equals
+        the declared one but has another number in numpy, or if a number must be converted. Raises ValueError if the
+        type of an array differs.
         """
         self._leaves[:, LAST] = 0
         leaves = [leaf for value in values for leaf in (value if isinstance(value, tuple) else (value,))]
         for k, leaf in enumerate(leaves):
-            if k not in self._all_numbers:
-                self._put(k, leaf)
+            self._put(k, leaf)
 
     def bind(self, *values: Any) -> tuple[int, tuple[Tie, ...]]:
         """Write the arguments as ``set`` does, but some of the numbers are ``Follow`` objects. Return the address of
@@ -128,27 +132,26 @@ class Arguments:
         are not written again.
         """
         end = first + len(leaves)
-        if not write_leaves(self._leaves_at, id(leaves), first, len(leaves), _ARRAY):
+        if not write_leaves(self._leaves_at, id(leaves), first, len(leaves), _OBJECTS):
             self._leaves[first:end, LAST] = 0
             for k, leaf in enumerate(leaves, first):
-                if k not in self._all_numbers:
-                    self._put(k, leaf)
-        for k in self._all_numbers:
+                self._put(k, leaf)
+        for k in self._all_integers:
             if first <= k < end:
-                self._put_number(k, leaves[k - first])
+                self._words[self._places[k]] = int(leaves[k - first])
         self._kept[first:end] = leaves
 
-    def _put_number(self, k: int, value: Any) -> None:
-        if self._kinds[k] == types.float64:
-            self._reals[self._places[k]] = value
-        else:
-            self._words[self._places[k]] = int(value)
-
     def _put(self, k: int, value: Any) -> None:
-        """Write an array by numpy's functions. The description of its leaf does not change, so the next call writes the
-        array again.
-        """
+        """Write a leaf in Python. The description of the leaf does not change, so the next call writes it again."""
         kind, at = self._kinds[k], self._places[k]
+        if isinstance(kind, types.Array):
+            self._put_array(kind, at, value)
+        elif kind == types.float64:
+            self._reals[at] = value
+        else:
+            self._words[at] = int(value)
+
+    def _put_array(self, kind: Any, at: int, value: Any) -> None:
         strided = _is_strided(kind)
         if not (strided or value.flags.c_contiguous):
             raise ValueError("an array of a table must be in C order")
