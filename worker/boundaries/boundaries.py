@@ -16,8 +16,8 @@ import numpy as np
 
 from ..kernels.jit import njit
 from ..migration.parcel import Parcel, length
-from ..model.growing import Rooms
-from ..model.state import Bits, Flags, Floats, Indices, Ints, Nodes, extended
+from ..model.growing import Rooms, extended
+from ..model.state import Bits, Flags, Floats, Indices, Ints, Nodes
 from ..model.topology import Split
 from ..parallel.arguments import Arguments
 from ..parallel.passes import Ranges

@@ -7,8 +7,9 @@ import numpy as np
 from ..clock import MEAN_DT
 from ..kernels.jit import Kernel
 from ..migration.parcel import Parcel
+from ..model.growing import extended
 from ..model.loads import Load
-from ..model.state import Bits, Floats, Indices, Ints, Nodes, extended
+from ..model.state import Bits, Floats, Indices, Ints, Nodes
 from ..model.topology import Split
 from ..parallel.arguments import Arguments, Follow
 from ..parallel.team import Stage

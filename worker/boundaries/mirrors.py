@@ -13,7 +13,8 @@ from conoid.cases.model.schema import Case, Symmetry
 
 from ..clock import DT
 from ..kernels.jit import njit, types
-from ..model.state import Bits, Flags, Floats, Indices, Ints, Model, Nodes, extended
+from ..model.growing import extended
+from ..model.state import Bits, Flags, Floats, Indices, Ints, Model, Nodes
 from ..parallel.arguments import Arguments, Follow, reader
 from ..parallel.comm import Comm
 from ..parallel.team import TASK, Stage

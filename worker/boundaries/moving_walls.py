@@ -22,7 +22,8 @@ import numpy as np
 
 from ..kernels.jit import njit, types
 from ..migration.parcel import Parcel
-from ..model.state import Bits, Flags, Floats, Indices, Ints, Nodes, extended
+from ..model.growing import extended
+from ..model.state import Bits, Flags, Floats, Indices, Ints, Nodes
 from ..parallel.arguments import Arguments, reader
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import scale_for

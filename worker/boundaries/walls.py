@@ -4,7 +4,8 @@ import numpy as np
 
 from ..clock import DT, T
 from ..kernels.jit import njit, types
-from ..model.state import Bits, Flags, Floats, Indices, Ints, Nodes, extended
+from ..model.growing import extended
+from ..model.state import Bits, Flags, Floats, Indices, Ints, Nodes
 from ..parallel.arguments import Arguments, Follow, reader
 from ..parallel.team import TASK, Stage
 from .boundaries import KEPT, Boundary, Stopping, free, mirrored

@@ -15,8 +15,9 @@ from conoid.cases.model.joined import shared_bonds
 from conoid.cases.model.schema import MOST_PARTS, Case
 
 from ..migration.parcel import Table
+from ..model.growing import extended
 from ..model.ids import places
-from ..model.state import Block, Floats, Indices, Ints, Model, Nodes, Tets, extended
+from ..model.state import Block, Floats, Indices, Ints, Model, Nodes, Tets
 from ..model.topology import Split
 from ..parallel.ownership import Neighbour
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..model.state import Floats, Ints, extended
+from ..model.growing import extended
+from ..model.state import Floats, Ints
 from . import matter
 from .passes import Values
 

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..kernels.jit import record, types
-from ..model.state import Flags, Floats, Indices, Ints, extended
+from ..model.growing import extended
+from ..model.state import Flags, Floats, Indices, Ints
 
 
 class FacetConstants(NamedTuple):

@@ -23,8 +23,9 @@ import numpy as np
 
 from ..kernels.jit import njit, several, types
 from ..mesh.faces import FACES
+from ..model.growing import extended
 from ..model.ids import among
-from ..model.state import BROKEN, Copies, Indices, Ints, Model, extended
+from ..model.state import BROKEN, Copies, Indices, Ints, Model
 from ..model.topology import KEY, Split, keys
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour

@@ -65,6 +65,18 @@ def spare(array: "np.ndarray", m: int) -> "np.ndarray | None":
     return room if len(room) >= m and same_memory(room[: len(array)], array) else None
 
 
+def extended(array: "np.ndarray", rows: "np.ndarray") -> "np.ndarray":
+    """Return ``array`` with ``rows`` appended: in the buffer of ``array``, if it has capacity, else in a larger one."""
+    n, m = len(array), len(array) + len(rows)
+    if n == m:
+        return array
+    if (room := spare(array, m)) is None:
+        room = np.empty((m + m // 2, *array.shape[1:]), array.dtype)
+        room[:n] = array
+    room[n:m] = rows
+    return room[:m]
+
+
 def same_memory(one: np.ndarray, two: np.ndarray) -> bool:
     """Return whether two C-ordered arrays of one type occupy the same memory."""
     return one.shape == two.shape and address_of(one) == address_of(two)

@@ -35,20 +35,6 @@ LAID_BARE = -2
 """Value of ``Block.across`` for a face that erosion has exposed. A face that was exposed at the start has -1."""
 
 
-def extended(array: "np.ndarray", rows: "np.ndarray") -> "np.ndarray":
-    """Return ``array`` with ``rows`` appended: in the buffer of ``array``, if it has capacity, else in a larger one."""
-    n, m = len(array), len(array) + len(rows)
-    if n == m:
-        return array
-    room = array.base
-    fits = isinstance(room, np.ndarray) and room.shape[1:] == array.shape[1:] and room.dtype == array.dtype
-    if room is None or not fits or len(room) < m or not np.may_share_memory(room[:1], array[:1]):
-        room = np.empty((m + m // 2, *array.shape[1:]), array.dtype)
-        room[:n] = array
-    room[n:m] = rows
-    return room[:m]
-
-
 @dataclass
 class Nodes:
     """Nodal arrays of one rank. The ``n`` nodes have the order of their global ids."""

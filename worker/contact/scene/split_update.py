@@ -7,7 +7,8 @@ the candidate pairs of its parent, on the same rank.
 import numpy as np
 
 from ...kernels.jit import njit
-from ...model.state import Block, Flags, Indices, Ints, Nodes, extended
+from ...model.growing import extended
+from ...model.state import Block, Flags, Indices, Ints, Nodes
 from ...model.topology import Split
 from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour
