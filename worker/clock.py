@@ -8,18 +8,19 @@ T, LOST, DT, LAST_DT, MEAN_DT, SHORTER, STABLE = range(7)
 """Indices of the clock's numbers in a program of steps (stretch.py). The order is that of ``Clock.numbers``."""
 
 COLLAPSE = 1e-6
-"""Smallest allowed ratio of the stable step to the first stable step. Below this ratio a tet counts as crushed and the
-run ends with an error. Chosen value: a run with a million times as many steps would never end."""
+"""Smallest allowed ratio of the stable step to the first stable step. If the ratio of the steps is smaller, a tet
+counts as crushed and the run ends with an error. Chosen value: a run with a million times as many steps would never
+end."""
 
 STARVED = 1e-3
-"""Ratio of the stable step to the first stable step below which the run gives a warning. With such a step the rest of
-the run would take a thousand times as many steps. Chosen value: dust and penetration reduce the stable step to a
-hundredth, which needs no warning."""
+"""Ratio of the stable step to the first stable step below which the run gives a warning. If the stable step is a
+thousandth of the first one, the rest of the run takes a thousand times as many steps. Chosen value: dust and
+penetration reduce the stable step to a hundredth, which needs no warning."""
 
 SLOWED = 0.1
-"""Ratio of the stable step to the first stable step, for runs that reach their limit of time or of steps. If the ratio
-is below this value, the run names the stable step as the reason. Chosen value: plastic flow and dust reduce the stable
-step to a third in any run."""
+"""Ratio of the stable step to the first stable step, for runs that reach their limit of time or of steps. If this ratio
+is smaller than the constant, the run reports the decrease of the stable step as the reason. Chosen value: plastic flow
+and dust reduce the stable step to a third in any run."""
 
 
 @njit("UniTuple(float64, 4)(float64, float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
@@ -57,8 +58,8 @@ class Clock:
         self.last_dt = 0.0
         """Time step from n-1 to n, s."""
         self.mean_dt = 0.0
-        """Mean of ``dt`` and ``last_dt``, s. In the velocity update from v(n-1/2) to v(n+1/2) the forces act for this
-        time."""
+        """Mean of ``dt`` and ``last_dt``, s. In the velocity update from v(n-1/2) to v(n+1/2) the forces act for the
+        mean of the two steps."""
         self.shorter = 0.0
         """A quarter of the difference ``last_dt - dt``, s."""
         self._first = 0.0
@@ -105,8 +106,8 @@ class Clock:
 
         The interval to the next frame is divided into equal steps, as few as are stable. Equal steps create little
         energy, and no step is much shorter than the others. ``growth`` bounds the ratio of two successive stable steps.
-        At the end time, ``dt`` is the length of the step that would follow. It is equal to the last step if the last
-        step is still stable, else it is equal to the stable step.
+        At the end time, ``dt`` is the length of the step that would follow: the last step if it is still stable, else
+        the stable step.
         """
         self.last_dt = self.dt
         left = (self._after if self.frame_due else self._landing) - self.t
@@ -140,8 +141,8 @@ class Clock:
         return self._growth * self.dt
 
     def choose_again(self, limit: float) -> float:
-        """Chooses the time step again, for another ``limit``. This function must be called before the time step is
-        used; see ``choose``.
+        """Chooses the time step again, for another ``limit``; to be called before the time step is used; see
+        ``choose``.
         """
         self.dt = self.last_dt
         return self.choose(limit)

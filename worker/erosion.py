@@ -4,9 +4,10 @@ the removed energy and momentum.
 A tet is marked in the pass over the elements (elements/wear.py); at this time its force of n+1 is already in the nodal
 sums. The tet is removed before the contact of the next step, so that this contact includes the exposed faces of its
 neighbours. The last force of a removed tet acts in one more velocity update. Therefore the second half of the work of
-this force is added one step later, as for a boundary. Tets that exceed only a strain or damage limit are collected for
-some steps and are then removed together, because each removal requires new mean normals. If a part has ``erosion.nodes
-= "strike"``, those nodes of the part that have no tets and received a contact impulse are removed in the same steps.
+the last force of a removed tet is added one step later, as for a boundary. Tets that exceed only a strain or damage
+limit are collected for some steps and are then removed together, because each removal requires new mean normals. If a
+part has ``erosion.nodes = "strike"``, those nodes of the part that have no tets and received a contact impulse are
+removed in the same steps.
 """
 
 import numpy as np
@@ -32,9 +33,9 @@ GATHERED = 10
 """Number of steps for which marked tets are collected before they are removed together. Chosen value: it is above 1,
 because each removal requires new mean normals and tests of all candidate pairs."""
 UNDECIDED = 0.25
-"""Ratio of the largest damage in a part to ``erosion.damage``. If the ratio is above this value and no tet was removed,
-the run gives a warning. Chosen value: in the example of a punch (docs/theory/erosion.md, Erosion) the damage of the
-plate is 0.42 and no tet is removed; with smaller tets the punch cuts a plug out of the plate."""
+"""Ratio of the largest damage in a part to ``erosion.damage``, above which the run gives a warning if no tet of the
+part was removed. Chosen value: in the example of a punch (docs/theory/erosion.md, Erosion) the damage of the plate is
+0.42 and no tet is removed; with smaller tets the punch cuts a plug out of the plate."""
 
 
 class Erosion:
@@ -99,8 +100,8 @@ class Erosion:
 
     def strikes(self) -> int:
         """Marks nodes that have no tets and received a contact impulse in this step, in parts with ``erosion.nodes =
-        "strike"``. This function must be called after contact. Returns TIRED (elements/wear.py) if nodes of this rank
-        must be removed, else SOUND.
+        "strike"``; to be called after contact. Returns TIRED (elements/wear.py) if nodes of this rank must be removed,
+        else SOUND.
         """
         loose = np.flatnonzero(self._loose)
         if self._contact is not None:
@@ -145,7 +146,7 @@ class Erosion:
         return not (self.due or self.account.outstanding or (self._tets_at == 0).any())
 
     def note(self, state: Nodes) -> None:
-        """Adds the second half of the work of the last removal. This function must be called before the kick."""
+        """Adds the second half of the work of the last removal; to be called before the kick."""
         self.account.note(state)
 
     def remove(self, state: Nodes) -> None:
@@ -157,7 +158,7 @@ class Erosion:
 
     def stop_removed(self, state: Nodes) -> None:
         """Adds the nodes that are removed in this step to the account, and sets the velocities of all removed nodes to
-        zero. This function must be called after the kick.
+        zero; to be called after the kick.
         """
         leaving, before = self._leaving
         if len(leaving):

@@ -51,7 +51,7 @@ class ErosionAccount:
         return bool(self._last or self._half.any())
 
     def note(self, state: Nodes) -> None:
-        """Adds the second half of the work of the last removal. This function must be called before the kick."""
+        """Adds the second half of the work of the last removal; to be called before the kick."""
         for tets, forces in self._last:
             work = np.zeros(len(tets))
             for corner in range(4):
@@ -64,9 +64,7 @@ class ErosionAccount:
         self._half[:] = 0
 
     def add_tets(self, block: Block, worn: Ints, x: Floats) -> None:
-        """Adds the energies of the tets ``worn`` of a block. This function must be called before these tets are
-        removed.
-        """
+        """Adds the energies of the tets ``worn`` of a block; to be called before these tets are removed."""
         self._last.append((block.tets[worn].astype(np.int64), _forces(block, worn, x)))
         self.work.add(_energies(block, worn))
 

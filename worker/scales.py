@@ -12,8 +12,8 @@ from .model.state import Model
 from .parallel.comm import Comm
 
 _SMALLEST_STRAIN = 1e-12
-"""Smallest strain whose nodal forces the force quantum must resolve. Chosen value: in steel, the stress at this strain
-is 0.2 Pa."""
+"""Smallest strain whose nodal forces the force quantum must resolve. Chosen value: in steel, the stress at the smallest
+strain is 0.2 Pa."""
 
 
 def extremes(model: Model, comm: Comm) -> tuple[float, float, float]:
@@ -31,7 +31,7 @@ def extremes(model: Model, comm: Comm) -> tuple[float, float, float]:
 
 def force_floor(model: Model, comm: Comm) -> float:
     """Returns the nodal force of the largest tet at the strain _SMALLEST_STRAIN, N. The force quantum is never made
-    smaller than this force requires.
+    smaller than the nodal force of the largest tet requires.
 
     Collective.
     """

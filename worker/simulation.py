@@ -92,7 +92,7 @@ class Simulation:
     made smaller."""
     reduction: StepReduction
     warnings: tuple[str, ...] = ()
-    """Warnings about the meshes. A resumed run has no such warnings."""
+    """Warnings about the meshes. A resumed run has no warnings about meshes."""
     _acts: Acts | None = None
 
     @property

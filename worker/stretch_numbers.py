@@ -81,9 +81,9 @@ def _ends(words, numbers, peaks):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def decide(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: executes the stage ``decide``, which follows the elements. It advances the simulated time. Then it either
-    ends the program, or chooses the next time step in the same way as step.py and prepares all argument tables for this
-    step.
+    """Task: executes the stage ``decide``, which follows the elements. The stage advances the simulated time. Then the
+    stage either ends the program, or chooses the next time step in the same way as step.py and prepares all argument
+    tables for this step.
     """
     words, numbers, peaks, ties = _of_decide(table)
     gather_peaks(peaks)

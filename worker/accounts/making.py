@@ -2,19 +2,8 @@
 
 The sum of all terms can be correct although one term is wrong: if a term returns more energy than it has received, this
 energy moves the bodies or goes into another term. Therefore the energy that each term has created is checked
-separately; it is divided by the largest energy so far: the maximum of the energy received, the work of the stress, and
-the kinetic energy.
-
-========  ==========================================  ===============================================
-lasting   plastic, viscous, friction, fracture        decrease of the term since its largest value
-returned  contact, averaging, eroded, cohesive        negative part of the term
-stepping  the time integration                        magnitude of the term: an error of either sign
-========  ==========================================  ===============================================
-
-The term ``elastic`` is not checked, because with an equation of state that depends on heat it is negative in hot matter
-that has expanded (docs/theory/time_integration.md, Time integration). When such material erodes, its elastic energy
-moves to ``eroded``, and its heat stays in ``plastic`` and ``viscous``. Therefore ``eroded`` may be negative, at most by
-the heat of the eroded tets. No term is checked while the largest energy is round-off.
+separately. This created energy is divided by the largest energy so far, which is the maximum of the energy received,
+the work of the stress, and the kinetic energy.
 """
 
 import math
@@ -28,33 +17,34 @@ LASTING = ("plastic", "viscous", "friction", "fracture")
 RETURNED = ("contact", "averaging", "eroded", "cohesive")
 STEPPING = "stepping"
 WARNED = 0.01
-"""Energy that a term may create without a warning, divided by the largest energy; the chosen value is the usual
-accuracy of reference values."""
+"""Energy that a term may create without a warning, divided by the largest energy. Chosen value: the usual accuracy of
+reference values."""
 STRAIN = 1e-10
-"""Volume strain of the whole model; energies below the energy of this strain count as round-off: positions are rounded
-to some 1e-16 of a coordinate, so strains are rounded to 1e-15, and the energy of this strain has a relative error of
-1e-5."""
+"""Volume strain of the whole model. An energy below the energy of this strain counts as round-off, because positions
+are rounded to about 1e-16 of a coordinate, so strains are rounded to 1e-15, and the energy of this strain has a
+relative error of 1e-5."""
 
 
 class Made(NamedTuple):
-    """The largest energy that a term has created."""
+    """Largest energy that a term has created."""
 
     share: float
-    """Energy that the term has created, divided by the largest energy up to that time."""
+    """Energy that the term has created, divided by the largest energy of the model up to that time."""
     t: float
-    """Time at which ``share`` was largest, s."""
+    """Simulated time at which ``share`` was largest, s."""
 
 
 class Making:
     """Energy that each term of the ledger has created so far. All ranks have equal values."""
 
     def __init__(self, rounding: float) -> None:
-        """``rounding``: energy, J. While the largest energy is not above this value, no term is checked."""
+        """``rounding``: energy, J. No term is checked while the largest energy of the model is below ``rounding``."""
         self._rounding = rounding
         self._largest = dict.fromkeys(LASTING, 0.0)
         self._energy = 0.0
         self.worst: dict[str, Made] = {}
-        """Energy created, keyed by the name of the term. Only terms that have created energy are in the table."""
+        """Energies created; the keys are the names of the terms. Only terms that have created energy are in the
+        table."""
 
     def keep(self) -> tuple[dict[str, float], float, dict[str, tuple[float, float]]]:
         """Return the energies for a checkpoint."""
@@ -110,8 +100,8 @@ class Making:
 
 
 def _cure(name: str, share: float, safety: float) -> str:
-    """Return the remedy for the energy that a term creates, if a remedy is derived and measured in
-    docs/theory/energy.md, "Energy that a line makes".
+    """Return the remedy for the energy that a term creates. The text is empty if docs/theory/energy.md, "Energy that a
+    line makes", derives no remedy.
     """
     if name == STEPPING:
         left = 0.5 * min(WARNED, share)

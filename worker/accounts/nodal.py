@@ -14,7 +14,7 @@ _nodal = reader(*OF_NODES)
 
 @njit("void(float64[::1], float64[::1], int32[::1], float64[::1], float64[::1])", cache=True)
 def add_booked(loss, external, nodes, lost, worked):  # type: ignore[no-untyped-def]
-    """Add the energies ``lost`` and ``worked`` of the nodes (n,) of a boundary to columns of all nodes."""
+    """Add the energies ``lost`` and ``worked`` of the nodes (n,) of a boundary to the columns of all nodes."""
     for i in range(len(nodes)):
         loss[nodes[i]] += lost[i]
         external[nodes[i]] += worked[i]

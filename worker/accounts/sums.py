@@ -50,7 +50,7 @@ class Totals:
     """The sums of the energy ledger at time n."""
 
     t: float
-    """Time at step n, s."""
+    """Simulated time at step n, s."""
     nodal: Floats
     """(NODAL,) sums of the rows of ``nodal.of_nodes`` over all nodes, rigid bodies and walls."""
     works: Floats
@@ -70,7 +70,7 @@ class Totals:
 
 
 class Sums:
-    """Computes the sums of the energy ledger. Every public method is collective."""
+    """Object that computes the sums of the energy ledger. Every public method is collective."""
 
     def __init__(
         self, model: Model, boundaries: list[Boundary], contact: Contact | None, bonds: Bonds | None,
@@ -119,8 +119,8 @@ class Sums:
         )  # fmt: skip
 
     def _tables(self, before: Floats) -> dict[str, list[Columns]]:
-        """Return the columns to be summed, in the order of the sums; these are NODAL, WORKS, one column for each
-        boundary with friction, one for bonds, and the columns of cohesive facets.
+        """Return the columns to be summed, in the order of the sums: NODAL, WORKS, one column for each boundary with
+        friction, one for bonds, and the columns of cohesive facets.
         """
         nodes, parts = self._model.nodes, len(self._model.parts)
         tables: dict[str, list[Columns]] = {
@@ -190,8 +190,8 @@ class Sums:
         return float(exact_sums(self._comm, values[counted][:, None])[0])
 
     def _counted(self) -> Flags:
-        """Return (nodes,) whether this rank counts each node; it counts the nodes that it owns, except nodes of rigid
-        parts.
+        """Return (nodes,) True for each node that this rank counts. It counts the nodes that it owns, except nodes of
+        rigid parts.
         """
         nodes, rigid = self._model.nodes, self._undeformed[0]
         return nodes.owned if rigid is None else nodes.owned & (rigid.of_part[nodes.part] < 0)

@@ -1,10 +1,11 @@
 """Seconds in each phase of the step: CPU time of this thread, and wall time inside and outside of parallel regions.
 
 MPI uses CPU time while it waits. The time in calls that wait for other ranks counts as ``exchange``; the time of the
-other phases is work. The loading of kernels at their first call counts in no phase. A parallel region is a call of
-``Team.run``; all threads of the rank share its tasks. The wall time in parallel regions is ``parallel``; the wall time
-outside of them, without the waiting, is ``serial``: one thread of the rank works and the other threads are idle.
-A single rank reads the CPU time only for reports, and divides it among the phases in proportion to their wall times.
+other phases is work. The time in which kernels are loaded at their first call is in no phase. A parallel region is a
+call of ``Team.run``; all threads of the rank share its tasks. The wall time in parallel regions is ``parallel``. The
+wall time outside of them, without the waiting, is ``serial``: in this time one thread of the rank works and the other
+threads are idle. A single rank reads the CPU time only for reports, and divides it among the phases in proportion to
+their wall times.
 """
 
 from collections.abc import Sequence
@@ -24,8 +25,8 @@ def worked(comm: Comm) -> float:
 
 
 def by_phase(seconds: Sequence[dict[str, float]]) -> dict[str, list[float]]:
-    """Return, for each phase, a list with one number for each rank; {} if there are no ranks. ``seconds``: seconds of
-    each rank, keyed by phase.
+    """Return a dictionary with a list for each phase, which has one number for each rank; {} if there are no ranks.
+    ``seconds``: for each rank, its seconds in each phase.
     """
     return {name: [each[name] for each in seconds] for name in PHASES} if seconds else {}
 
@@ -43,18 +44,18 @@ class Spent:
     """Seconds in each phase, and the waiting time of all phases together."""
 
     cpu: dict[str, float] = field(default_factory=_none)
-    """CPU time of this thread, keyed by phase."""
+    """CPU time of this thread in each phase."""
     serial: dict[str, float] = field(default_factory=_none)
-    """Wall time outside of parallel regions without the waiting, keyed by phase. The wall time includes the time of
+    """Wall time outside of parallel regions without the waiting, in each phase. The wall time includes the time of
     other programs on the same core."""
     parallel: dict[str, float] = field(default_factory=_none)
-    """Wall time in parallel regions, keyed by phase."""
+    """Wall time in parallel regions, in each phase."""
     waiting: float = 0.0
     """CPU time in calls that wait for other ranks; this time is also part of ``exchange`` of ``cpu``."""
     helped: float = 0.0
-    """Time of the other threads of the rank in tasks, summed over these threads."""
+    """Time that the other threads of the rank have spent in tasks, summed over these threads."""
     projected: dict[int, dict[str, float]] = field(default_factory=dict)
-    """Estimate of ``cpu`` without the waiting, keyed by the number of threads (parallel/projecting.py)."""
+    """Estimate of ``cpu`` without the waiting; the keys are numbers of threads (parallel/projecting.py)."""
 
     def since(self, before: "Spent") -> "Spent":
         """Return the difference between this state and an earlier state."""
@@ -65,7 +66,7 @@ class Spent:
         )  # fmt: skip
 
     def of_all_phases(self) -> dict[str, float]:
-        """Return the sums over all phases, for messages.Load."""
+        """Return the sums over all phases, for the message messages.Load."""
         return {
             "serial": sum(self.serial.values()), "parallel": sum(self.parallel.values()), "waiting": self.waiting,
             "helped": self.helped,
@@ -78,7 +79,7 @@ class Spent:
 
 
 class Timers:
-    """Accumulated time in each phase."""
+    """Time in each phase, summed over the run so far."""
 
     def __init__(self, comm: Comm, team: Team) -> None:
         self._comm, self._team = comm, team
@@ -89,7 +90,7 @@ class Timers:
 
     @property
     def seconds(self) -> dict[str, float]:
-        """CPU time so far, s, keyed by phase."""
+        """CPU time so far in each phase, s."""
         return self.spent.cpu
 
     def begin(self) -> None:
@@ -107,7 +108,9 @@ class Timers:
         self._reported, self._helped = self.spent.copy(), self._team.helped
 
     def phase(self, name: str) -> "_Phase":
-        """Return a context that adds its time to a phase. The time of a phase inside of the context is subtracted."""
+        """Return a context that adds the time of its block to a phase. If another phase is used inside of the block,
+        its time is subtracted.
+        """
         return self._blocks[name]
 
     def switch(self, name: str) -> str:
@@ -134,8 +137,8 @@ class Timers:
 
     def divide(self, inside: dict[str, float], outside: dict[str, float]) -> None:
         """End the present phase, in which a program of several phases ran, and divide its time among these phases.
-        ``inside``, ``outside``: wall time of the program in and outside of parallel regions, s, keyed by phase; the
-        rest of the time belongs to the present phase.
+        ``inside``, ``outside``: wall time of each phase of the program in parallel regions and outside of them, s. The
+        rest of the time is added to the present phase.
         """
         wall, spent = wall_time(), self.spent
         cpu = self._cpu_at(wall)
@@ -175,7 +178,7 @@ class Timers:
         self._spans = spans
 
     def since_last(self) -> Spent:
-        """Return the time since the last call of this method. The method must be called between phases."""
+        """Return the time since the last call of this method, s. The method must be called between phases."""
         self.switch(self._phase)
         if self._alone:
             self._settle()
@@ -186,8 +189,8 @@ class Timers:
 
 
 class _Phase:
-    """Context of a phase; it is a class, because a step opens two dozen contexts, and a context made from a generator
-    takes longer.
+    """Context of a phase. The context is a class, because a step enters two dozen contexts, and a context made from a
+    generator takes longer.
     """
 
     __slots__ = ("_name", "_outer", "_timers")

@@ -26,11 +26,12 @@ class BondAccount:
         self._local: Indices = np.zeros(0, np.int32)
         """(h,) nodes on which the last impulses act."""
         self._total, self._before = np.zeros((0, 3), np.int64), np.zeros((0, 3))
-        """Two arrays (h, 3) for these nodes: last impulses, quanta, and velocities v(n-1/2), m/s."""
+        """Two arrays (h, 3) for the nodes on which the last impulses act: these impulses, quanta, and velocities
+        v(n-1/2), m/s."""
 
     def note(self, v: Floats, local: Indices) -> None:
-        """Adds the second half of the work of the last impulses. Then stores v(n-1/2) of the nodes ``local``. This
-        function must be called before the kick.
+        """Adds the second half of the work of the last impulses. Then stores v(n-1/2) of the nodes ``local``; to be
+        called before the kick.
         """
         self._before = v[self._local]
         self._book()

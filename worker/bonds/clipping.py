@@ -25,8 +25,8 @@ from ..kernels.jit import njit, types
 _MOST = 9
 """Length of the arrays of polygon corners. A triangle that is cut by three lines has at most six corners."""
 OPPOSED = -0.5
-"""Largest cosine between the normals of two faces that may be bonded. With the chosen value the normals may differ by
-at most 60 degrees from exactly opposed normals."""
+"""Largest cosine between the normals of two faces that may be bonded. Chosen value: the normals of the two faces may
+differ by at most 60 degrees from exactly opposed normals."""
 _F1, _F2, _F3, _N2, _I = (
     types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int32[:, ::1], types.int64,
 )  # fmt: skip

@@ -25,7 +25,7 @@ _SETTLED = 1e-7
 value: the energy dissipated by the bond is then below 1e-9 of the energy transmitted through the bond
 (docs/theory/bonds.md)."""
 _SLOWEST = 0.02
-"""Smallest value that is used for the ratio of the smallest to the largest eigenvalue of the tied rows. With this value
+"""Smallest value that is used for the ratio of the smallest to the largest eigenvalue of the tied rows; with this ratio
 a step has 60 sweeps. Chosen value: a smallest value is needed because the bound of the ratio is zero for tied nodes
 with prescribed motion."""
 _WORDS = 6
@@ -129,9 +129,9 @@ def _norms(
     bound of the l1 norm of each row of this rank, kg; the l1 norm is sum_k |w_k| S_k / m_k, where S_k is the sum of
     |w_k| over all rows.
 
-    The values of a row are 0 if none of its nodes can move. They are also 0 across ``planes`` (r, 3) of symmetry that
-    contain the tied node, because the mirror image of the mortar side keeps the node on the plane. ``of_bodies`` (r,):
-    contribution of rigid bodies to the norms, 1/kg.
+    The bounds and norms of a tied row are 0 if none of its nodes can move. The norms are also 0 across ``planes`` (r,
+    3) of symmetry that contain the tied node, because the mirror image of the mortar side keeps the node on the plane.
+    ``of_bodies`` (r,): contribution of rigid bodies to the norms, 1/kg.
     """
     known = np.unique(np.concatenate([rows.node, rows.master]))
     sums = np.bincount(np.searchsorted(known, rows.master), np.abs(rows.weight), len(known))

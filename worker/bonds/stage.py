@@ -64,14 +64,14 @@ class Bonds:
     # The step ------------------------------------------------------------------------------------------------------
 
     def note(self, state: Nodes) -> None:
-        """Adds the second half of the work of the last impulses to the account, and stores v(n-1/2). This function must
-        be called before the kick.
+        """Adds the second half of the work of the last impulses to the account, and stores v(n-1/2); to be called
+        before the kick.
         """
         self.account.note(state.v, self._laid.local)
 
     def predict(self, state: Nodes) -> None:
         """Applies the impulses of the last step (warm start), so that contact starts from velocities that nearly
-        satisfy the bonds. This function must be called after the kick. Collective.
+        satisfy the bonds; to be called after the kick. Collective.
         """
         layout, mean_dt = self._laid, self._clock.mean_dt
         ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0

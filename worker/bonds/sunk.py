@@ -1,4 +1,6 @@
-"""Overlap, at the start, of two parts with a tied bond. Contact does not detect this overlap."""
+"""Overlap, at the start, of two parts with a tied bond. Contact does not detect an overlap of parts with a tied
+bond.
+"""
 
 from collections.abc import Iterator
 

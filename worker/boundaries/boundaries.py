@@ -39,8 +39,8 @@ class Boundary(ABC):
     """True if the boundary acts after contact, because contact must not change the velocities that the boundary has
     corrected."""
     mirrors = False
-    """True if all nodes of the boundary lie on one plane in which the body is mirrored. Exposed faces in this plane do
-    not belong to the surface."""
+    """True if all nodes of the boundary lie on one plane in which the body is mirrored. Exposed faces in the plane of
+    the boundary do not belong to the surface."""
     on_faces = False
     """True if the boundary acts on faces of tets, not on nodes."""
 
@@ -104,7 +104,7 @@ class Boundary(ABC):
         return []
 
     def went_on(self, dt: float) -> None:  # noqa: B027 (most boundaries need no time step)
-        """Sets the last time step to ``dt``, s. This function must be called after a program of steps."""
+        """Sets the last time step to ``dt``, s; to be called after a program of steps."""
 
     def measure(self, mass: float, speed: float) -> None:  # noqa: B027 (most add up no integers of their own)
         """Chooses the quanta from the largest nodal ``mass``, kg, and the largest ``speed``, m/s, of the scene."""

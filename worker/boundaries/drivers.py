@@ -150,8 +150,8 @@ class Traction(Forcing):
 
 
 class PrescribedVelocity(Driver):
-    """Prescribed velocity components of nodes, multiplied by the factor of the ``course``. The value is NaN for a free
-    component.
+    """Prescribed velocity components of nodes, multiplied by the factor of the ``course``. A free component has the
+    value NaN.
 
     A step uses the mean of the factor over the length of the step, so that positions at n are exact.
     """

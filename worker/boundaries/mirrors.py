@@ -1,4 +1,5 @@
-"""Symmetry planes for nodes that do not start on the plane. Such a node hits its own mirror image at the plane.
+"""Symmetry planes for nodes that do not start on the plane. A node that reaches the plane hits its own mirror image
+there.
 
 A node with tets and its image exert equal forces on each other, so that neither of the two passes the plane: the plane
 acts as a wall on each side. Nodes without tets do not interact. A node without tets passes its image and is replaced by
@@ -26,8 +27,8 @@ _TOGETHER = 64
 """Number of nodes that are tested together in one loop with vector instructions. Nodes are tested one by one only if at
 least one of them would end beyond the plane."""
 _TURNS = 1000
-"""Largest number of planes that a node without tets may pass in a step. The limit ends the loop if the velocity is not
-finite."""
+"""Largest number of planes that a node without tets may pass in a step. The limit ends the loop over planes if the
+velocity is not finite."""
 
 
 _F, _F1, _F2, _I1 = types.float64, types.float64[::1], types.float64[:, ::1], types.int64[::1]

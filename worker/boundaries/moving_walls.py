@@ -197,8 +197,8 @@ def deepest(found, shapes, x, nodes, held):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task of ``MovingWalls._sum``: computes the impulses of wall ``k`` on a range of nodes. The numbered comments are
-    the steps for one node.
+    """Task of ``MovingWalls._sum``: computes the impulses of wall ``k`` on a range of nodes. Numbered comments in the
+    code explain the steps for one node.
     """
     (
         sums, x, v, mass, nodes, owned, held, mirrored, given, step, rubbed, shapes, wall, k, mu, scale, weight, dt,

@@ -34,8 +34,8 @@ _BITS = 42
 """Binary logarithm of the number of quanta in the largest force on a node of a face at the start. Chosen value: the
 round-off is 1e-13 of the force of a face. The area of a face may increase by a factor 2^(_MOST - _BITS)."""
 _MOST = 56
-"""Binary logarithm of the largest number of quanta on a node of a face. With this limit the sum of 64 faces at a node
-cannot overflow."""
+"""Binary logarithm of the largest number of quanta on a node of a face. With this number of quanta, the sum of the
+forces of 64 faces at a node cannot overflow."""
 
 
 def scale(spec: Traction, outward: Floats) -> float:
@@ -68,7 +68,7 @@ class SurfacePressure(Forcing):
         """Nodes shared with each neighbour at the last planning of the exchange."""
         self._watched: list[tuple[Block, Ints, Ints]] | None = None
         """Blocks of parts that fracture. For each block: its loaded faces, and the places of the tets of these faces.
-        The list is empty before its first use."""
+        The list of blocks is empty before its first use."""
 
     @property
     def force(self) -> Floats:

@@ -49,8 +49,8 @@ class Walls:
         )  # fmt: skip
         self.friction = np.array([each.friction for each in specs])
         self.given = np.array([each.velocity for each in specs]).reshape(n, 3)
-        """(w, 3) velocity of each wall in the case, m/s. It is the velocity at the start, or it is multiplied by the
-        factor of the wall's course."""
+        """(w, 3) velocity of each wall in the case, m/s. The given velocity is the velocity at the start, or it is
+        multiplied by the factor of the wall's course."""
         self._courses = [Course(each.course) for each in specs]
         self.mass = np.array([each.mass or np.inf for each in specs])
         """(w,) mass of each wall, kg; infinite for a fixed or driven wall."""
@@ -87,7 +87,7 @@ class Walls:
         return bytes(self.shapes.point[moving].tobytes() + self.speed[moving].tobytes())
 
     def kinetic(self) -> float:
-        """Returns the kinetic energy at n of the walls with a mass, J. It is half of the mass times the product of the
+        """Returns the kinetic energy at n of the walls with a mass, J: half of the mass times the product of the
         velocities before and after n.
         """
         free = self.lightness > 0.0
@@ -103,7 +103,7 @@ class Walls:
         return np.concatenate([p.sum(axis=0), np.stack(about, axis=1).sum(axis=0)])
 
     def note(self) -> None:
-        """Stores v(n-1/2). This function must be called before the kick."""
+        """Stores v(n-1/2); to be called before the kick."""
         self.before[:] = self.speed
 
     def kick(self, dt: float, t: float) -> None:

@@ -16,8 +16,8 @@ _SWEEPS = 4
 sharper corner an error remains, which the next step corrects."""
 ACROSS = 1e-12
 """Smallest squared length of the unit normal of a wall after the components held by symmetry planes are set to zero. If
-the value is smaller, the wall is parallel to a symmetry plane and cannot push the node. Chosen value: it is far above
-round-off (1e-32) and below the value of any angle that a user intends."""
+the squared length is smaller, the wall is parallel to a symmetry plane and cannot push the node. Chosen value: it is
+far above round-off (1e-32) and below the value of any angle that a user intends."""
 
 
 class RigidWalls(Stopping):
@@ -140,8 +140,8 @@ def _forget(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: stops the nodes of a range at all walls, and adds half of the work of the impulses. The numbered comments
-    are the steps for one node.
+    """Task: stops the nodes of a range at all walls, and adds half of the work of the impulses. Numbered comments in
+    the code explain the steps for one node.
 
     The impulses are added to ``impulse``, the friction impulses also to ``rubbed``, and the impulses of each wall to
     ``given``. If a wall stopped a node, column 0 of ``pushed`` (threads, 8) is set to the time ``t``.

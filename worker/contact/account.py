@@ -8,8 +8,8 @@ from ..model.state import Ints
 from ..parallel.fixed_point import Tally
 
 _AHEAD = 2.0
-"""Safety factor of the account. Penetrations are corrected only while the energy in the account exceeds this factor
-times the largest energy that contact has returned in one step so far."""
+"""Safety factor of the account. Penetrations are corrected only while the energy in the account exceeds the safety
+factor times the largest energy that contact has returned in one step so far."""
 
 
 class Account:

@@ -65,8 +65,8 @@ class Books:
         # The energies and impulses of a copy of a node start with zero; the parent keeps its values.
         nodes.columns.declare(self, contact_loss=ZERO, external_work=ZERO, pressed=ZERO)
         self.open: Ints = np.zeros((0, 3), np.int64)
-        """(nodes, 3) impulses of the last step before a restart or a repartition, quanta. After the work of these
-        impulses was added, the array has the shape (0, 3)."""
+        """(nodes, 3) impulses of the last step before a restart or a repartition, quanta. After the work of the
+        impulses from before a restart was added, the array has the shape (0, 3)."""
 
     def keep(self, parcel: Parcel, scene: Scene | None) -> None:
         """Adds all sums to the ``parcel`` (a checkpoint or migration message). If there is a scene, the impulses of the

@@ -7,8 +7,8 @@ from .scene.scene import Scene
 
 _SURFACE, _LISTED, _TESTED, _ACTIVE = 9.0, 0.1, 3.0, 4.0
 """Costs of contact in a step, in units of 50 ns: of a surface node (average of searches and registrations), of a listed
-pair, of a tested pair or crack, and of an active contact. The costs are 450, 3, 150 and 200 ns. They were measured in
-the profile of the shattering bar to 40 us on one rank."""
+pair, of a tested pair or crack, and of an active contact. The costs are 450, 3, 150 and 200 ns. The costs were measured
+in the profile of the shattering bar to 40 us on one rank."""
 
 
 def effort(now: Scene | None, on_surface: Flags) -> Floats:

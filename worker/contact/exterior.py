@@ -1,4 +1,4 @@
-"""Surface, cracks and node normals of a rank. The module also updates these data."""
+"""Surface, cracks and node normals of a rank. The module also updates the surface, the cracks and the normals."""
 
 import numpy as np
 
@@ -98,9 +98,9 @@ class Exterior:
         return self.surface.flags & self._model.nodes.owned
 
     def _build(self, flags: Flags, turned: Ints) -> surface.Surface:
-        """Returns the surface. It includes the sides of cracks that may open, and the faces behind tets near erosion.
-        ``flags`` (n,): nodes that have been on the surface and remain surface nodes; ``turned``: edges that have become
-        sharp and remain sharp. Collective.
+        """Returns the surface, which includes the sides of cracks that may open, and the faces behind tets near
+        erosion. ``flags`` (n,): nodes that have been on the surface and remain surface nodes; ``turned``: edges that
+        have become sharp and remain sharp. Collective.
         """
         model, neighbours, comm = self._model, self._neighbours, self._comm
         sides, covered = self.cracks.foresee(), np.zeros((0, 3), np.int32)
@@ -149,8 +149,8 @@ class Exterior:
         return False
 
     def _loosen(self, loose: Flags) -> None:
-        """Updates the mobility of nodes that have lost their last tet. Such a node is held only by boundaries that act
-        on the node itself.
+        """Updates the mobility of nodes that have lost their last tet. A node without tets is held only by boundaries
+        that act on the node itself.
         """
         if (loose & ~self.motion.loose).any():
             self.motion.loose, self.motion.mobility = loose, mobilities(self._model.nodes, self._bounds)
@@ -164,7 +164,7 @@ class Exterior:
 
     def age(self) -> bool:
         """Admits the edges of all present cracks to edge-edge contact, if the run has edge-edge contact. Returns True
-        if a search must add these edges. Collective.
+        if a search must add edges of cracks. Collective.
         """
         return self._edges and self.cracks.age(self._comm.sum(self.cracks.ages))
 
@@ -211,7 +211,7 @@ class Exterior:
 
     def open(self, received: Ints, scene: Scene | None) -> bool:
         """Adds the sides of the wide cracks of all ranks to the surface; ``received``: rows of ``widened``. Returns
-        True if some of these sides are missing in the scene.
+        True if some sides of wide cracks are missing in the scene.
         """
         received = received.reshape(-1, _WORDS)
         nodes, sides = self._model.nodes, received[:, 3:9].reshape(-1, 3)

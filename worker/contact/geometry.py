@@ -7,7 +7,7 @@ import numpy as np
 from ..kernels.jit import njit
 
 MARGIN = 1e-3
-"""Tolerance of the area coordinates. If the foot of a node is outside of a face by less than this value, the foot
+"""Tolerance of the area coordinates: if the foot of a node is outside of a face by less than the tolerance, the foot
 counts as being on the face."""
 VECTOR = "UniTuple(float64, 3)"
 """Type of a vector in numba's notation."""

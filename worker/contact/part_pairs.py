@@ -13,8 +13,8 @@ from ..rigid.stage import Rigid
 
 
 def friction(case: Case) -> Floats:
-    """(parts, parts) Coulomb's coefficient of friction. The value is NaN if the two parts cannot be in contact, for
-    example parts of one body that cannot separate.
+    """(parts, parts) Coulomb's coefficient of friction. The coefficient is NaN if the two parts cannot be in contact,
+    for example parts of one body that cannot separate.
     """
     assert case.contact is not None
     spec, names = case.contact, [part.name for part in case.parts]
@@ -45,9 +45,9 @@ def lighter(mu: Floats, nodes: Nodes, mobility: Floats, comm: Comm, rigid: Rigid
     lighter part; the result is the maximum over all pairs in contact. For ``rigid`` bodies the mass is that of the
     whole body; the result is 0 if there is no pair. Collective.
 
-    No impulse exceeds this mass times a speed, because the lighter part has no more momentum. A part with a held
-    direction (``mobility`` (nodes, 3) is 0) can transmit any impulse. In this case the mass of the other part of the
-    pair is used.
+    No impulse exceeds the mass of the heaviest node times a speed, because the lighter part has no more momentum. A
+    part with a held direction (``mobility`` (nodes, 3) is 0) can transmit any impulse. For a pair with such a part, the
+    mass of the other part is used.
     """
     mass, held = np.zeros(len(mu)), np.zeros(len(mu))
     np.maximum.at(mass, nodes.part, nodes.mass)

@@ -84,12 +84,12 @@ class Contact:
         self._scheme, self.sweep_count = _Scheme.of(case), SweepCount(sweeps(case))
         self.detection = Detection(team, registered, lasting=not (case.fractures or case.erodes))
         self.limit = 0.0
-        """Inverse of a time step, 1/s. It is the largest step in which no node of any rank passes more than half of a
-        tet with which it is in contact."""
+        """Inverse of the largest time step, 1/s, in which no node of any rank passes more than half of a tet with which
+        it is in contact."""
         self.last_push = 0.0
         """Simulated time of the last contact impulse on a node of this rank, s."""
         self._mean_dt = 0.0
-        """Mean time step at the last step with a scene, s. The kick of that step used this time."""
+        """Mean time step at the last step with a scene, s, which the kick of that step used."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the state of contact to the ``parcel`` of a checkpoint or migration message. The candidate pairs are not
@@ -204,9 +204,7 @@ class Contact:
         self.exterior.grow(split)
 
     def note(self, state: Nodes) -> None:
-        """Stores v(n-1/2), and adds the second half of the work of the last impulses. This function must be called
-        before the kick.
-        """
+        """Stores v(n-1/2), and adds the second half of the work of the last impulses; to be called before the kick."""
         now = self.searches.scene
         self.books.due()
         self.sweep_count.unsettled[:] = 0
@@ -229,8 +227,8 @@ class Contact:
         return self.searches.spent(state)
 
     def look_ahead(self, state: Nodes) -> bool:
-        """Limits the first step because of the pairs that approach each other. Returns True if there are any such
-        pairs. Collective.
+        """Limits the first step because of the pairs that approach each other. Returns True if any pairs approach each
+        other. Collective.
         """
         if (now := self.searches.scene) is None:
             return False
@@ -242,8 +240,8 @@ class Contact:
         return self.limit > 0.0
 
     def solve(self, state: Nodes, dt: float, t: float) -> None:
-        """Corrects v(n+1/2) by the impulses of active contacts at time ``t``, s. This function must be called after the
-        kick. Collective.
+        """Corrects v(n+1/2) by the impulses of active contacts at time ``t``, s; to be called after the kick.
+        Collective.
         """
         if (now := self.searches.scene) is not None:
             with self._timers.phase("contact"):

@@ -29,10 +29,10 @@ def kinds(case: Case) -> Indices:
 
 
 class Averages:
-    """Rows of the nodal means on one rank. A rank that has a node has all rows of the node."""
+    """Rows of the nodal means on one rank. If a rank has a node, it has all rows of the node."""
 
     def __init__(self, model: Model, neighbours: list[Neighbour], kinds: Indices) -> None:
-        """``kinds`` (parts,): for each part the part that represents its material."""
+        """``kinds`` (parts,): for each part, the part that represents its material."""
         self._model, self._of, self._kinds = model, neighbours, kinds
         nodes = model.nodes
         more = _more(nodes, kinds)
@@ -44,7 +44,7 @@ class Averages:
         for block in model.blocks:
             block.own_averages = self._rows(block)
         self.neighbours = [Neighbour(other.rank, self._shared(other.nodes)) for other in neighbours]
-        """Neighbour ranks, each with the rows that this rank shares with it."""
+        """Neighbour ranks, with the rows that this rank shares with each of them."""
 
     @classmethod
     def of(cls, case: Case, model: Model, neighbours: list[Neighbour]) -> "Averages | None":
@@ -66,16 +66,14 @@ class Averages:
         return np.arange(self._model.nodes.n, self.n)
 
     def at(self, node: "np.ndarray", part: "np.ndarray | int") -> Ints:
-        """Returns the rows of local nodes for the materials of parts; -1 if there is no row of a node and a
-        material.
-        """
+        """Returns the rows of local nodes for the materials of parts; -1 if a node has no row for a material."""
         wanted = np.asarray(node, np.int64) * MOST_PARTS + self._kinds[part]
         at = places(self._keys, wanted)
         return np.where(at >= 0, self._order[at], -1)
 
     def grow(self, split: Split) -> Ints:
-        """Adds the rows of the copies of separated nodes. The tets must already have their new nodes. Returns the
-        parent row of each new row.
+        """Adds rows for the copies of separated nodes. The tets must already have their new nodes. Returns the parent
+        row of each new row.
         """
         nodes, first = self._model.nodes, split.first
         copies, (node, part) = split.copies, nodes.of_parts()
@@ -103,8 +101,8 @@ class Averages:
             left = np.delete(left, first)
 
     def of_nodes(self, columns: dict[str, "np.ndarray"]) -> dict[str, "np.ndarray"]:
-        """Returns (nodes, ...) values of ``columns`` (rows, ...); the value of a node is that of one of its materials:
-        the material of the part that represents the node.
+        """Returns (nodes, ...) values of ``columns`` (rows, ...), one for each node. If a node has several materials,
+        the value is that of the material of the part that represents the node.
         """
         nodes = self._model.nodes
         rows = self.at(np.arange(nodes.n), nodes.part)
@@ -124,7 +122,7 @@ class Averages:
 
     def resume(self, table: Table, columns: dict[str, "np.ndarray"]) -> dict[str, "np.ndarray"]:
         """Returns ``columns`` (nodes, ...) of a parcel (a checkpoint or migration message), extended by the rows of
-        ``table``.
+        ``table``, which has the means at nodes of several materials.
         """
         rows, found = self.at(self._model.nodes.places(table["of"]), table["kind"]), {}
         for name, values in columns.items():
@@ -141,8 +139,8 @@ class Averages:
         return np.ascontiguousarray(self.at(block.tets, block.part), np.uint32)
 
     def _shared(self, nodes: Indices) -> Indices:
-        """Rows of ``nodes``, ordered by node id and then by material. The order is the same on the two ranks that share
-        the nodes.
+        """Returns the rows of ``nodes``, ordered by node id and then by material. Two ranks that share the nodes get
+        the same order.
         """
         mine = np.isin(self.node, nodes)
         rows = np.flatnonzero(mine)
@@ -151,15 +149,16 @@ class Averages:
 
 
 def _more(nodes: Nodes, kinds: Indices) -> Ints:
-    """(k, 2) nodes and their further materials. The material of the part that represents a node is omitted."""
+    """(k, 2) nodes and their further materials. The material of the part that represents the node is omitted."""
     shares = nodes.shares
     pairs = np.column_stack([shares.node, kinds[shares.part]]).astype(np.int64)
     return np.unique(pairs[pairs[:, 1] != kinds[nodes.part[shares.node]]], axis=0)
 
 
 def volumes(averages: "Averages | None", nodes: Nodes, node_volume: Floats, density: Sequence[float]) -> Floats:
-    """(rows,) reference volumes at the start, m^3; they are ``node_volume`` (nodes,), or for nodes of several materials
-    the volume of each material, computed with the ``density`` of the parts, kg/m^3.
+    """(rows,) reference volumes at the start, m^3. The value of a node with one material is its volume, ``node_volume``
+    (nodes,). For a node of several materials the value is the volume of each material, computed with the ``density`` of
+    the parts, kg/m^3.
     """
     if averages is None:
         return node_volume

@@ -23,7 +23,7 @@ from .passes import BlockPass, Values
 
 
 class AveragedElements(Elements):
-    """Elements in the ``nodal`` or ``split`` pressure form. A step makes two passes over the tets; the nodal volume
+    """Elements in the ``nodal`` or ``split`` pressure form. A step makes two passes over the tets. The nodal volume
     sums are completed between the passes.
     """
 
@@ -34,7 +34,7 @@ class AveragedElements(Elements):
     ) -> None:  # fmt: skip
         """``averages``: table of the rows of the means; None if the rows are the nodes. ``weight`` (rows,): 1 /
         reference volume, 1/m^3; ``params`` (parts, SIZE): material constants of each part; ``kinds`` (parts,): TETS or
-        LINEAR (matter.py). ``scene``: boundaries, among them symmetry planes, which mirror the means. ``more``: whether
+        LINEAR (matter.py). ``scene``: boundaries, among them symmetry planes, which mirror the means. ``more``: True if
         an equation of state of the case also averages heat or bulking.
         """
         self._averages, self._columns, self.split = averages, 3 if more else 2, split
@@ -51,7 +51,7 @@ class AveragedElements(Elements):
 
     @property
     def _kind(self) -> Indices:
-        """(rows,) a part that has the material of the row."""
+        """(rows,) one part that has the material of the row."""
         return self.model.nodes.part if self._averages is None else self._averages.kind
 
     @property

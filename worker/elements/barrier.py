@@ -20,10 +20,10 @@ from ..model.state import CHUNK
 from .scratch import CHANGE, LIMIT, MODULUS, VOLUME
 
 SQUEEZED = 0.2
-"""Ratio of the volume of a tet to its initial volume below which the barrier acts; chosen value: the smallest volume
-ratio of tets is 0.56 in Taylor bars, and 0.28 in a long rod without erosion."""
+"""Ratio of the volume of a tet to its initial volume, below which the barrier pressure acts. Chosen value: the smallest
+volume ratio of tets is 0.56 in Taylor bars, and 0.28 in a long rod without erosion."""
 STIFF = 0.1
-"""Stiffness of the barrier, divided by the bulk modulus; chosen value: compression to half of SQUEEZED requires a
+"""Stiffness of the barrier, divided by the bulk modulus. Chosen value: compression to half of SQUEEZED requires a
 pressure of 10 % of the bulk modulus, which is far more than the yield stress of metals."""
 
 _ROUNDING = 1e-9
@@ -34,8 +34,8 @@ _Q, _MASS, _WORK, _WORK_VISCOUS = VISCOUS * CHUNK, MASS * CHUNK, WORK * CHUNK, W
 
 @njit("UniTuple(float64, 2)(float64, float64)", cache=True, error_model="numpy")
 def _barrier(ratio, bulk):  # type: ignore[no-untyped-def]
-    """Returns b and -J db/dJ, Pa. If the volume of the tet is not positive, b and its derivative are zero; the stable
-    step of such a tet is NaN.
+    """Returns the barrier pressure b and -J db/dJ, Pa. If the volume of the tet is not positive, both are zero; the
+    stable step of such a tet is NaN.
     """
     if not 0.0 < ratio < SQUEEZED:
         return 0.0, 0.0
@@ -46,8 +46,8 @@ def _barrier(ratio, bulk):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[::1], float64[::1], float64, int64)", cache=True, error_model="numpy")
 def _any_squeezed(w, s, density, n):  # type: ignore[no-untyped-def]
-    """Returns True if the volume of a tet, before or after the step, is below SQUEEZED or equal to SQUEEZED within
-    round-off; the loop uses vector instructions.
+    """Returns True if the volume of a tet, before or after the step, is below SQUEEZED times its initial volume, or
+    equal to this limit within round-off. The loop uses vector instructions.
     """
     per_mass, found = density / (SQUEEZED * (1.0 + _ROUNDING)), 0
     for i in range(n):
@@ -61,8 +61,8 @@ def resist(w, s, params, n):  # type: ignore[no-untyped-def]
     """Adds the barrier pressure to the row VISCOUS, which is recomputed in every step. Adds the work of the barrier to
     the row WORK, and the stiffness of the barrier to the row LIMIT.
 
-    The function for the viscosity has added half of the work of the old row VISCOUS to its own account; the barrier's
-    share in this work is subtracted.
+    The function for the viscosity has added half of the work of the old row VISCOUS to its own account. The function
+    ``resist`` subtracts the part of the viscous work that is due to the barrier.
     """
     if not _any_squeezed(w, s, params[DENSITY], n):
         return

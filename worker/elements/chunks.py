@@ -1,4 +1,4 @@
-"""Steps of a pass over the elements for one chunk: rates and stress, pressure and limit, forces, marks and peaks.
+"""Steps of a pass over the elements for one chunk: rates and stress, pressure and stable step, forces, marks and peaks.
 
 ``t`` (n, 4): tets of the chunk; ``s``: its state; ``w`` and ``wi``: scratch (records.py).
 """
@@ -33,7 +33,7 @@ from .records import BODY, HOT, LARGEST_FORCE, LARGEST_LIMIT, LIMITING_TET, MARK
 from .wear import SOUND, mark_worn
 
 _NO_TET = 2**62
-"""Value that is larger than any global id of a tet."""
+"""Number that is larger than any global id of a tet."""
 _F, _I, _B, _B1, _T2 = types.float64, types.int64, types.boolean, types.boolean[::1], types.uint32[:, ::1]
 _F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
 
@@ -47,17 +47,18 @@ def rates(w, v, t, n, dt):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _F2, _T2, _I), cache=True, error_model="numpy")
 def first_speeds(w, v, t, n):  # type: ignore[no-untyped-def]
-    """Sets SPEED from the velocities of the nodes, for tets whose volume before the step is not stored."""
+    """Sets the row SPEED from the velocities of the nodes, for tets whose volume before the step is not stored."""
     tet4.gather(w[scratch.RATE :], v, t, w[:0], n)
     tet4.speeds(w, n)
 
 
 @njit(types.void(_I, _F1, _F1, _F1, _I, _F), cache=True, error_model="numpy")
 def from_rates(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Computes the deviatoric stress of a chunk and its work. The steps are rotation, elastic trial and plastic return.
+    """Computes the deviatoric stress of a chunk, and the work of this stress. The steps are rotation, elastic trial and
+    plastic return.
 
-    For a law that acts after the pressure, this function computes only the trial stress; ``return_at_pressure`` then
-    does the plastic return.
+    If the law acts after the pressure, this function computes only the trial stress; ``return_at_pressure`` then does
+    the plastic return.
     """
     predict(w, s, n, params[SHEAR], dt)
     if params[ORDER] == BEFORE_PRESSURE:
@@ -67,8 +68,8 @@ def from_rates(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_I, _F1, _F1, _F1, _I, _F), cache=True, error_model="numpy")
 def return_at_pressure(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the deviatoric stress of a chunk to a strength that depends on the new pressure. Adds the work of the new
-    stress to the energies of the tets.
+    """Returns the deviatoric stress of a chunk to the yield surface, if the strength depends on the new pressure. Adds
+    the work of the new stress to the energies of the tets.
     """
     if params[ORDER] == AFTER_PRESSURE:
         strengthen(strength, w, s, params, n, dt)
@@ -95,7 +96,7 @@ def viscosity_and_limit(w, s, params, n, dt, averaged):  # type: ignore[no-untyp
 
 @njit(types.void(_I1, _I1, _I1, _I, _I), cache=True)
 def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
-    """Raises the peaks of a thread to the peaks of a chunk of tets. ``ids``: global ids of the tets; ``force``: bit
+    """Updates the peaks of a thread by the peaks of a chunk of tets. ``ids``: global ids of the tets; ``force``: bit
     pattern of the largest force of the chunk.
     """
     peaks[LARGEST_FORCE] = max(peaks[LARGEST_FORCE], force)
@@ -112,7 +113,7 @@ def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_I2), cache=True)
 def gather_peaks(threads):  # type: ignore[no-untyped-def]
-    """Raises the peaks of the first thread to the maximum over all ``threads`` (threads, 8)."""
+    """Sets the peaks of the first thread to the maximum over all ``threads`` (threads, 8)."""
     peaks = threads[0]
     for t in range(1, len(threads)):
         mine = threads[t]
@@ -137,8 +138,8 @@ def sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale):  # type: ignore[
 
 @njit(_I(_I2, _F1, _F1, _I1, _I1, _B1, _T2, _I, _F), cache=True, error_model="numpy")
 def sum_fluxes(gradient, pressure, w, wi, peaks, flat, t, n, scale):  # type: ignore[no-untyped-def]
-    """Adds the pressure gradient of a chunk to the nodal sums, without ``flat`` tets. Returns the largest contribution
-    as its bit pattern (integer).
+    """Adds the pressure gradient of a chunk to the nodal sums, without the ``flat`` tets. Returns the largest
+    contribution as its bit pattern (integer).
     """
     largest = averaged.pressure_fluxes(wi, w, pressure, t, n, scale)
     if len(flat) > 0:
@@ -150,8 +151,8 @@ def sum_fluxes(gradient, pressure, w, wi, peaks, flat, t, n, scale):  # type: ig
 
 @njit(_B(MARKS, _I, _I, _F1, _I1, _F1, _F1, _I), cache=True, error_model="numpy", forceinline=True)
 def mark(marks, first, last, w, peaks, s, params, rows):  # type: ignore[no-untyped-def]
-    """Marks the tets from ``first`` to ``last`` of a block that erosion will remove, and the overstressed faces of the
-    tets. Returns True if any tet or face is marked.
+    """Marks two kinds of tets from ``first`` to ``last`` of a block: the tets that erosion will remove, and the tets
+    with overstressed faces, together with these faces. Returns True if any tet or face is marked.
 
     ``w``, ``s``: scratch and state of the chunk of these tets.
     """
@@ -167,8 +168,8 @@ def mark(marks, first, last, w, peaks, s, params, rows):  # type: ignore[no-unty
 
 @njit(types.void(_F1, _F2, _T2, _F1, _B, _I), cache=True, error_model="numpy")
 def volumes_at_rest(w, x, t, s, shape, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_MID and DILATATION of a chunk at rest. ``shape``: whether the law computes the stress from the
-    undeformed shape.
+    """Sets the rows VOLUME_MID and DILATATION of a chunk at rest. ``shape``: True if the law computes the stress from
+    the undeformed shape.
     """
     if shape:
         tet4.unchanged(w, s, n)
@@ -179,7 +180,7 @@ def volumes_at_rest(w, x, t, s, shape, n):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _F1, BODY, MEANS, _T2, _B1, _I), cache=True, error_model="numpy", forceinline=True)
 def take_means(w, s, body, means, means_of, flat, n):  # type: ignore[no-untyped-def]
-    """Sets SEEN to the nodal means for a chunk, and adds the nodal means of heat or bulking to the state of the
+    """Sets the row SEEN to the nodal means for a chunk. Adds the nodal means of heat or bulking to the state of the
     chunk.
     """
     averaged.gather_strains(w, means.strain, means_of, n)
@@ -191,8 +192,8 @@ def take_means(w, s, body, means, means_of, flat, n):  # type: ignore[no-untyped
 
 @njit(types.void(_F1, _F1, _F2, _T2, _B, _I, _F), cache=True, error_model="numpy")
 def own_change(w, s, v, t, shape, n, dt):  # type: ignore[no-untyped-def]
-    """Sets CHANGE and SPEED of a chunk after the first pass. ``shape``: whether the law computes the stress from the
-    undeformed shape.
+    """Sets the rows CHANGE and SPEED of a chunk after the first pass. ``shape``: True if the law computes the stress
+    from the undeformed shape.
     """
     if shape:
         averaged.recall_growth(w, s, n, dt)
@@ -204,9 +205,9 @@ def own_change(w, s, v, t, shape, n, dt):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _F1, BODY, _F2, _T2, _B1, _I), cache=True, error_model="numpy", forceinline=True)
 def averaged_pressure(w, s, body, matter, means_of, flat, n):  # type: ignore[no-untyped-def]
-    """Computes pressure, work of the pressure and MODULUS of a chunk in the averaged pressure forms (`nodal`, `split`).
-    The pressure is computed from the volume strains of the tets or is a mean over their nodes. The pressure of ``flat``
-    tets is computed from their own strain.
+    """Computes pressure, work of the pressure and the row MODULUS of a chunk in the averaged pressure forms (`nodal`,
+    `split`). The pressure is computed from the volume strains of the tets, or it is a mean over their nodes. The
+    pressure of ``flat`` tets is computed from their own strain.
     """
     params, eos, rows = body.params, body.eos, body.rows
     if len(flat) > 0:

@@ -2,7 +2,7 @@
 share no node.
 
 Greedy colouring in the order of the chunks: each chunk gets the first colour that no earlier chunk with a common node
-has. The colours stay valid until tets move from chunk to chunk; a separation of nodes only removes common nodes.
+has. The colours remain valid until tets move from chunk to chunk. A separation of nodes only removes common nodes.
 """
 
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ from ..parallel.arguments import Arguments
 from ..parallel.team import Team
 
 _BITS = 63
-"""Number of colours whose bits fit into an integer. A chunk for which no colour is free gets a further colour that no
-other chunk has."""
+"""Number of colours whose bits fit into an integer. If no colour is free for a chunk, the chunk gets a further colour
+that no other chunk has."""
 
 
 @dataclass(frozen=True)
@@ -71,10 +71,10 @@ def whole(begin: int, end: int) -> Coloured:
 
 
 class TetPass:
-    """A kernel that is run over the chunks of blocks and adds to sums of nodes."""
+    """Kernel that runs over the chunks of blocks and adds values to sums at nodes."""
 
     def __init__(self, team: Team, kernel: Kernel, *kinds: Any) -> None:
-        """``kernel``: kernel with the signature team.TASK, whose range is a range of chunks; ``kinds``: numba types of
+        """``kernel``: kernel with the signature team.TASK; its range is a range of chunks. ``kinds``: numba types of
         its arguments.
         """
         self._team, self._kernel, self._arguments = team, kernel, Arguments(*kinds)

@@ -1,5 +1,5 @@
-"""Largest compression of brittle materials that have no law of compressive failure, divided by Griffith's criterion; it
-is computed in every step, for a warning (cases/warnings/compression.py).
+"""Largest compression of brittle materials that have no law of compressive failure, divided by Griffith's criterion.
+This compression is computed in every step, for a warning (cases/warnings/compression.py).
 
 A material without a law of compressive failure breaks in tension only and bears any compression. Each stress is
 compared with the criterion of Griffith (1924): the ratio (s1 - s3)^2 / (8 T (s1 + s3)), with the largest principal
@@ -31,13 +31,13 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P = PRESSURE * CHUNK
 _MOST = 100
-"""Largest number of Newton iterations; chosen value: in general 6 iterations are enough. If two principal stresses are
+"""Largest number of Newton iterations. Chosen value: in general 6 iterations are enough. If two principal stresses are
 nearly equal, each iteration only halves the error, and 30 iterations reduce the error to round-off."""
 _ROUNDING = 1e-15
-"""Residual, divided by the cube of the root, at which the Newton iteration ends: a few last bits of a float64. The
-relative error of a double root is then the square root of this value."""
+"""Residual of the Newton iteration, divided by the cube of the root, at which the iteration ends: a few last bits of a
+float64. The relative error of a double root is then the square root of this value."""
 CHUNKS_OF_A_TASK = 16
-"""Number of chunks in a task; chosen value: a task takes at least 10 us, compared with 2 us to start a parallel
+"""Number of chunks in a task. Chosen value: a task takes at least 10 us, compared with 2 us to start a parallel
 region."""
 _I, _F, _I1, _F1, _F3 = types.int64, types.float64, types.int64[::1], types.float64[::1], types.float64[:, :, ::1]
 _LOOK = _I1, _F1, _F3, _I1, _I, _F, _F
@@ -72,16 +72,18 @@ def principal(s, i):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64, float64)", cache=True, error_model="numpy")
 def _beyond(s1, s3, strength):  # type: ignore[no-untyped-def]
-    """Returns the ratio of Griffith's criterion for the principal pressures s1 and s3."""
+    """Returns the ratio of Griffith's criterion for the largest principal pressure s1 and the smallest principal
+    pressure s3.
+    """
     s3 = max(s3, 0.0)
     return (s1 - s3) ** 2 / (8.0 * strength * (s1 + s3)) if s1 > 0.0 else 0.0
 
 
 @njit("boolean(float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _below(s, i, least):  # type: ignore[no-untyped-def]
-    """Returns True if two bounds show that 8 T times the ratio of tet ``i`` of a chunk is below ``least``, Pa. The
-    bounds are computed from the invariants of the stress. First, the ratio is at most s1 / 8 T, and s1 <= p + 2 r with
-    r = sqrt(J2 / 3). Second, s1 - s3 <= 2 sqrt(J2) and s1 + s3 >= 2 p - r.
+    """Returns True if one of two bounds shows that 8 T times the ratio of tet ``i`` of a chunk is below ``least``, Pa,
+    with the tensile strength T. The bounds are computed from the invariants of the stress. First, the ratio is at most
+    s1 / 8 T, and s1 <= p + 2 r with r = sqrt(J2 / 3). Second, s1 - s3 <= 2 sqrt(J2) and s1 + s3 >= 2 p - r.
     """
     xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
     j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
@@ -91,8 +93,9 @@ def _below(s, i, least):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _above(s, i, least):  # type: ignore[no-untyped-def]
-    """Returns True if two bounds show that 8 T times the ratio of tet ``i`` of a chunk is above ``least``, Pa. First,
-    s1 - s3 >= sqrt(3 J2) and s1 + s3 <= 2 p + r. Second, s1 >= p + r, even if s3 is a tension and counts as zero.
+    """Returns True if one of two bounds shows that 8 T times the ratio of tet ``i`` of a chunk is above ``least``, Pa,
+    with the tensile strength T. First, s1 - s3 >= sqrt(3 J2) and s1 + s3 <= 2 p + r. Second, s1 >= p + r, even if s3 is
+    a tension and counts as zero.
     """
     xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
     j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
@@ -102,8 +105,8 @@ def _above(s, i, least):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _not_below(s, n, least):  # type: ignore[no-untyped-def]
-    """Returns the number of the ``n`` tets of a chunk for which ``_below`` is not true; the loop has no branch, so that
-    it uses vector instructions.
+    """Returns the number of the ``n`` tets of a chunk for which ``_below`` is False. The loop has no branch, so that it
+    uses vector instructions.
     """
     some = 0
     for i in range(n):
@@ -114,9 +117,9 @@ def _not_below(s, n, least):  # type: ignore[no-untyped-def]
 @njit("Tuple((int64, float64))(float64[:, :, ::1], int64[::1], int64, float64, float64, int64, int64)", cache=True,
       error_model="numpy")  # fmt: skip
 def hardest(state, ids, n, strength, known, first, stop):  # type: ignore[no-untyped-def]
-    """Returns the place of the tet with the largest ratio, and the ratio. Returns -1 if no ratio is above ``known``. Of
-    tets with equal ratio, the tet with the smallest id is returned. Only tets in the chunks from ``first`` to ``stop``
-    are checked; ``n``: number of tets of the block.
+    """Returns the place of the tet with the largest ratio, and the ratio. Returns -1 if no ratio is above ``known``. If
+    several tets have the same ratio, the tet with the smallest id is returned. Only tets in the chunks from ``first``
+    to ``stop`` are checked; ``n``: number of tets of the block.
 
     Bounds exclude most chunks, and most tets of the remaining chunks.
     """
@@ -182,8 +185,8 @@ def _count(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class Met:
-    """The most compressed tet: ratio to the criterion, principal pressures, Pa, id and centre, m, of the tet, and the
-    time, s.
+    """The most compressed tet of a part: ratio to the criterion, principal pressures, Pa, id of the tet, centre of the
+    tet, m, and simulated time, s.
     """
 
     times: float = 0.0
@@ -195,8 +198,8 @@ class Met:
 
 
 class Crushing:
-    """Largest compression so far in each part of a brittle material that has no law of compressive failure; the stored
-    values are those of this rank; ``keep`` and ``found`` compute the maximum over the ranks.
+    """Largest compression so far in each part of a brittle material that has no law of compressive failure. The stored
+    values are those of this rank. The methods ``keep`` and ``found`` compute the maximum over the ranks.
     """
 
     def __init__(self, model: Model, strengths: Floats, comm: Comm, clock: Clock, team: Team) -> None:
@@ -219,7 +222,7 @@ class Crushing:
         return cls(model, np.array(strengths), comm, clock, team) if any(strengths) else None
 
     def update(self) -> None:
-        """Raises the largest compressions to those of the present stresses."""
+        """Updates the largest compressions with the present stresses."""
         for block in self._blocks():
             place, times = self._hardest(block, self._met[block.part].times)
             if place >= 0:
@@ -230,7 +233,7 @@ class Crushing:
         return [block for block in self._model.blocks if self._strengths[block.part] > 0.0]
 
     def _hardest(self, block: Block, known: float) -> tuple[int, float]:
-        """Returns ``hardest`` over all chunks of a block."""
+        """Returns the result of ``hardest`` for all chunks of a block."""
         chunks, strength = block.chunks, float(self._strengths[block.part])
         places, times = np.empty(self._looking.many(chunks), np.int64), np.empty(self._looking.many(chunks))
         self._looking.run(chunks, places, times, block.state, block.id, block.n, strength, known)
@@ -257,8 +260,8 @@ class Crushing:
         return Met(times, most, least, int(block.id[place]), (x, y, z), self._clock.t)
 
     def _of_all(self) -> list[Met]:
-        """Returns the largest compression of each part over all ranks. Of equal compressions the earliest is returned.
-        Collective.
+        """Returns the largest compression of each part over all ranks. If two compressions are equal, the earlier one
+        is returned. Collective.
         """
         shared = self._comm.share(self._met)
         return [min(found, key=lambda met: (-met.times, met.time, met.tet)) for found in zip(*shared, strict=True)]

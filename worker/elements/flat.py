@@ -3,8 +3,8 @@ do not contribute to the nodal means.
 
 The volume of a flat tet is small compared with the volume of its neighbours, so it has little influence on a nodal
 mean. A motion along the altitude of a flat tet hardly strains the neighbours but may reduce its volume to zero; after
-yield no stress resists this motion. With its own pressure the flat tet resists as in the ``standard`` form; the number
-of flat tets is small, so they cause no locking.
+yield no stress resists this motion. With its own pressure the flat tet resists the motion as in the ``standard`` form.
+The number of flat tets is small, so flat tets cause no locking.
 """
 
 import numpy as np
@@ -21,15 +21,15 @@ from .pressure import STABILISE
 from .scratch import CHANGE, MODULUS, SEEN, VOLUME, VOLUME_MID
 
 THINNEST = 0.1
-"""Smallest ratio of altitude to longest edge of a tet whose volume strain is averaged; a tet with a smaller ratio is
-flat. The ratio of a regular tet is 0.82; chosen value: at this ratio a motion that strains the neighbours by a tenth
+"""Smallest ratio of altitude to longest edge of a tet whose volume strain is averaged. A tet with a smaller ratio is
+flat. The ratio of a regular tet is 0.82. Chosen value: at this ratio a motion that strains the neighbours by a tenth
 reduces the volume of the tet to zero (docs/theory/elements.md)."""
 
 _HEAT, _NODAL_WORK, _MASS, _GROWN = HEAT * CHUNK, NODAL_WORK * CHUNK, MASS * CHUNK, DILATION * CHUNK
 
 
 def flat_tets(block: Block, x0: Floats) -> Flags:
-    """(n,) whether each tet of a block is flat at the start; (0,) if no tet is flat."""
+    """(n,) True for each tet of a block that is flat at the start; (0,) if no tet is flat."""
     tets = block.tets.astype(np.int64)
     x = x0[tets]
     edges = x[:, 1:] - x[:, :1]
@@ -52,7 +52,7 @@ def exclude_flat(w, flat, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], boolean[::1], int64, int64)", cache=True, error_model="numpy")
 def own_strain(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
-    """Sets SEEN of flat tets to their own volume strain, and HEAT, if they have heat, to their own heat.
+    """Sets the row SEEN of flat tets to their own volume strain. Sets the row HEAT, if there is one, to their own heat.
 
     The volume strain is the change of volume divided by the volume at mid-step. The volume at mid-step is the volume at
     the end less half of the change, up to terms of third order.
@@ -76,8 +76,8 @@ def own_strain(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def own_pressure(eos, w, s, alone, params, flat, rows, n):  # type: ignore[no-untyped-def]
-    """Computes pressure, work of the pressure, and MODULUS of flat tets, if the pressures of other tets are means over
-    their nodes. ``alone`` contains the state before the pressure is computed, and is overwritten.
+    """Computes pressure, work of the pressure, and the row MODULUS of flat tets, if the pressures of other tets are
+    means over their nodes. ``alone`` contains the state before the pressure is computed, and is overwritten.
     """
     modulus = w[MODULUS : MODULUS + CHUNK].copy()
     press(eos, w, alone, params, n)

@@ -17,16 +17,17 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _Q = PRESSURE * CHUNK, VISCOUS * CHUNK
 _NEAREST_BITS = 0x4338000000000000
-"""Bit pattern of NEAREST."""
+"""Bit pattern of the float64 NEAREST."""
 MAGNITUDE = 0x7FFFFFFFFFFFFFFF
-"""Mask that removes the sign bit of a float64. As integers, the masked bit patterns have the order of the absolute
-values, and NaN is above all numbers."""
+"""Mask that removes the sign bit of a float64. Read as integers, the masked bit patterns have the order of the absolute
+values, and NaN is larger than all numbers."""
 
 
 @njit("int64(float64)", cache=True, error_model="numpy", forceinline=True)
 def _whole(x):  # type: ignore[no-untyped-def]
-    """Returns the integer nearest to x, |x| < 2^51; of two equally near integers the even one. The integer is read from
-    the last bits of a sum, because many processors have no instruction that converts a vector of float64 to integers.
+    """Returns the integer nearest to x, |x| < 2^51. If two integers are equally near, the even one is returned. The
+    integer is read from the last bits of a sum, because many processors have no instruction that converts a vector of
+    float64 to integers.
     """
     return np.float64(x + NEAREST).view(np.int64) - _NEAREST_BITS
 
@@ -40,7 +41,7 @@ def quanta(a, b, c, scale):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64, float64, float64)", cache=True, error_model="numpy")
 def largest_of(a, b, c):  # type: ignore[no-untyped-def]
-    """Returns the bit pattern of the largest magnitude of three numbers; NaN is above all numbers."""
+    """Returns the bit pattern of the largest magnitude of three numbers. NaN is larger than all numbers."""
     return max(
         max(np.float64(a).view(np.int64) & MAGNITUDE, np.float64(b).view(np.int64) & MAGNITUDE),
         np.float64(c).view(np.int64) & MAGNITUDE,
@@ -49,8 +50,8 @@ def largest_of(a, b, c):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def internal_forces(wi, w, s, n, scale):  # type: ignore[no-untyped-def]
-    """Sets nine rows of -V stress grad N of nodes 1, 2, 3, N, in quanta of 1 / ``scale``. Returns the largest force as
-    its bit pattern (integer).
+    """Sets nine rows to the forces -V stress grad N on nodes 1, 2, 3, in quanta of 1 / ``scale`` N. Returns the largest
+    force as its bit pattern (integer).
 
     ``scatter_forces`` adds minus the sum of these forces to node 0.
     """

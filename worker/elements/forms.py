@@ -1,5 +1,5 @@
 """The ``standard`` pressure form, with the methods that the time step calls. The methods advance the elements by a step
-and start the completion of shared nodes; averaging.py has the other forms.
+and start the completion of the sums at shared nodes. The other forms are in averaging.py.
 
 Border chunks are computed before interior chunks. Border chunks contain every tet of a shared node, so the exchange
 runs during the pass over the interior chunks.
@@ -41,7 +41,7 @@ class FlagExchange(Protocol):
     """Flags for the neighbour ranks. The flags are sent together with the forces of shared nodes."""
 
     def words(self, hot: bool) -> Ints:
-        """(neighbours,) flags to send, computed after the tets of shared nodes; ``hot``: whether a face of these tets
+        """(neighbours,) flags to send, computed after the tets at shared nodes. ``hot``: True if a face of these tets
         is overstressed.
         """
 
@@ -66,13 +66,13 @@ class Elements:
         self._standard = BlockPass(tasks.standard, tasks.STANDARD)
         self._again = BlockPass(tasks.again, tasks.AGAIN, marked=False)
         self._coloured: dict[tuple[int, int], tuple[int, Coloured]] = {}
-        """Tasks of a range of chunks, keyed by part and first chunk. Each entry has the count of moved tets
-        (``Block.moved``) for which its tasks are valid."""
+        """Tasks of ranges of chunks; the key is the part and the first chunk. Each entry also has the value of
+        ``Block.moved`` (count of moved tets) for which its tasks are valid."""
         self._comm, self._neighbours = comm, neighbours
         self._flags: FlagExchange | None = None
         self._connect()
         self.cohesion: Bridges | None = None
-        """Cohesive facets, if there are any."""
+        """Cohesive facets; None if the case has none."""
 
     @property
     def pressure(self) -> Floats:
@@ -86,8 +86,8 @@ class Elements:
 
     @property
     def limit(self) -> float:
-        """The largest 1 / stable step of this rank's tets, 1/s; the value is NaN if a tet is inverted or has a value
-        that is not a number.
+        """Largest 1 / stable step of this rank's tets, 1/s. The value is NaN if a tet is inverted or has a value that
+        is not a number.
         """
         return self._reals[records.LARGEST_LIMIT]
 
@@ -113,26 +113,26 @@ class Elements:
 
     @property
     def nodal(self) -> list[Floats]:
-        """Nodal arrays of the pressure form, (nodes,) each, for the digest."""
+        """Nodal arrays of the pressure form for the digest, (nodes,) each."""
         return []
 
     def advance(self, dt: float, scale: float) -> None:
         """Computes stress and forces at n+1. Adds the forces to nodal sums, which must be zero on entry. On return the
-        completion of shared nodes is in progress.
+        completion of the sums at shared nodes is in progress.
         """
         self.scratches.peaks[:] = 0
         self._bridge(scale, opens=True)
         self._over(self._standard, (), (dt, scale), self._send)
 
     def advancing(self, dt: Follow, scale: Follow) -> list[tuple[Stage, Block | None]]:
-        """Returns the work of ``advance`` on a single rank as stages of a program, with the block of each stage.
+        """Returns the passes of ``advance`` on a single rank as stages of a program, with the block of each stage.
         ``scratches.peaks`` must be zero before the stages.
         """
         return self._staged(self._standard, (), (dt, scale))
 
     def ending(self, scale: Follow) -> list[Stage] | None:
-        """Returns the work of ``finish`` on a single rank as stages of a program; None if code outside of the program
-        is needed.
+        """Returns the kernels of ``finish`` on a single rank as stages of a program; None if code outside of the
+        program is needed.
         """
         return []
 
@@ -159,8 +159,8 @@ class Elements:
         self.peaks[records.LARGEST_FORCE] = max(int(self.peaks[records.LARGEST_FORCE]), largest)
 
     def grow(self, split: Split) -> None:
-        """Extends the exchange after a separation of nodes. Before the call, the copies must be shared nodes and the
-        tets must have their new nodes.
+        """Extends the exchange of forces after a separation of nodes. Before the call, the copies must be shared nodes
+        and the tets must have their new nodes.
         """
         if not self.shared_forces.serves(self._neighbours):
             self.free()
@@ -179,14 +179,14 @@ class Elements:
         self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]] = parcel.known["peaks"]
 
     def attach(self, flags: FlagExchange) -> None:
-        """Sends the given flags with the forces from now on. Collective among neighbours."""
+        """Sends the given flags together with the forces, after this call. Collective among neighbours."""
         first, self._flags = self._flags is None, flags
         if first:
             self.free()
             self._connect()
 
     def finish(self) -> None:
-        """Waits until the forces of shared nodes are complete."""
+        """Waits until the sums of forces at shared nodes are complete."""
         self.shared_forces.finish(self.model.nodes.force)
         if self._flags is not None:
             self._flags.receive(self.shared_forces.received)

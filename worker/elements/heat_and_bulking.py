@@ -23,8 +23,8 @@ HEATED = NODAL_WORK + 1
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def take_bulking(s, params, i, more):  # type: ignore[no-untyped-def]
-    """Adds ``more`` to the bulking of tet ``i``, Pa. Corrects the row TAKEN by the change of the stored energy, because
-    the law has used the energy that its own bulking would store at the nodes.
+    """Adds ``more`` to the bulking pressure of tet ``i``, Pa. Corrects the row TAKEN by the change of the stored
+    energy, because the law has used the energy that its own bulking would store at the nodes.
 
     As in materials/johnson_holmquist.py, the stored energy per volume is (K m + bulking)^2 / 2K, with a quarter of the
     volume at each corner. The stored energy is zero if the material is expanded beyond zero stress.
@@ -41,10 +41,10 @@ def take_bulking(s, params, i, more):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
 def scatter_heat(sums, w, s, params, weight, tets, n):  # type: ignore[no-untyped-def]
-    """Adds the specific work of each tet since the last step to the sums of its nodes; a node gets a quarter.
+    """Adds the specific work of each tet since the last step to the sums of its nodes. Each node gets a quarter.
 
-    The heat has the unit bulk modulus / density and is weighted by volume, as the volume change is; ``sums`` (nodes,
-    3).
+    The heat has the unit bulk modulus / density, and is weighted by volume, in the same way as the volume change.
+    ``sums`` (nodes, 3).
     """
     unit = params[DENSITY] / params[BULK]
     for i in range(n):
@@ -61,8 +61,8 @@ def scatter_bulking(sums, w, s, params, weight, tets, n):  # type: ignore[no-unt
     """Adds a quarter of the new bulking of each tet to the sums of its nodes, weighted by volume as in
     ``scatter_heat``.
 
-    The unit is the bulk modulus. A flat tet has the volume zero in this sum and therefore gives no bulking to its
-    nodes.
+    The unit of bulking in the nodal sum is the bulk modulus. A flat tet has the volume zero in the nodal sum and
+    therefore gives no bulking to its nodes.
     """
     per_bulk = 1.0 / params[BULK]
     for i in range(n):
@@ -89,14 +89,14 @@ def scatter_more(sums, w, s, params, weight, tets, rows, n):  # type: ignore[no-
 
 @njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
 def gather_heat(s, heat, tets, n):  # type: ignore[no-untyped-def]
-    """Adds the mean heat of the four nodes to HEAT, which is the heat in the pressure of each tet."""
+    """Adds the mean heat of the four nodes to the row HEAT, which is the heat in the pressure of each tet."""
     for i in range(n):
         s[_HEAT + i] += 0.25 * ((heat[tets[i, 0]] + heat[tets[i, 1]]) + (heat[tets[i, 2]] + heat[tets[i, 3]]))
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], uint32[:, ::1], boolean[::1], int64)", cache=True)
 def gather_bulking(s, params, bulking, tets, flat, n):  # type: ignore[no-untyped-def]
-    """Adds the mean bulking of the four nodes to BULKING. Tets that are ``flat``, (n,) or (0,), keep their own
+    """Adds the mean bulking of the four nodes to the row BULKING. Tets that are ``flat``, (n,) or (0,), use their own
     bulking.
     """
     quarter = 0.25 * params[BULK]
@@ -108,7 +108,7 @@ def gather_bulking(s, params, bulking, tets, flat, n):  # type: ignore[no-untype
 
 @njit("void(float64[::1], float64[::1], int64, int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def stretch_corner(w, s, i, k, strain):  # type: ignore[no-untyped-def]
-    """Updates the volume ratio at corner ``k`` of tet ``i`` by a volume strain. Sets CORNER_CHANGE."""
+    """Updates the volume ratio at corner ``k`` of tet ``i`` by a volume strain. Sets the row CORNER_CHANGE."""
     half, before = 0.5 * strain, s[_CORNERS + k * CHUNK + i]
     after = before * (1.0 + half) / (1.0 - half)
     s[_CORNERS + k * CHUNK + i], w[CORNER_CHANGE + k * CHUNK + i] = after, after - before
@@ -119,10 +119,10 @@ def stretch_corner(w, s, i, k, strain):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def gather_corners(w, s, params, bulking, tets, strain, flat, n):  # type: ignore[no-untyped-def]
-    """Updates bulking as a mean over nodes, the volume ratio at each node, and CORNER_CHANGE, which is the change of
-    the volume ratio.
+    """Updates the bulking as a mean over nodes, the volume ratio at each node, and the row CORNER_CHANGE, which is the
+    change of the volume ratio.
 
-    Heat stays at the nodes (matter.py).
+    Heat remains at the nodes (matter.py).
     """
     gather_bulking(s, params, bulking, tets, flat, n)
     for i in range(n):

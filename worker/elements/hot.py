@@ -1,4 +1,4 @@
-"""Faces of a tet that are overstressed by the stress of the tet alone. This inexpensive test is made before the
+"""Faces of a tet that are overstressed by the stress of the tet alone. The inexpensive test of faces is made before the
 fracture criterion (fracture/criterion.py).
 """
 
@@ -15,8 +15,8 @@ _P = PRESSURE * CHUNK
 @njit("boolean(float64, float64, float64, float64, float64, float64, float64, float64, float64, float64, float64)",
       cache=True, error_model="numpy")  # fmt: skip
 def _passes(bx, by, bz, xx, yy, zz, yz, zx, xy, weight, square):  # type: ignore[no-untyped-def]
-    """Returns True if the square of the first form of the criterion is at least ``square``, Pa^2, for the traction on
-    the area vector b.
+    """Returns True if the square of the first form of the criterion is at least ``square``, Pa^2. The traction is that
+    on the area vector b.
     """
     tx, ty, tz = xx * bx + xy * by + zx * bz, xy * bx + yy * by + yz * bz, zx * bx + yz * by + zz * bz
     area = bx * bx + by * by + bz * bz

@@ -9,9 +9,9 @@ from .scratch import AREAS, LIMIT, MODULUS, SPEED, VOLUME
 
 _MASS = MASS * CHUNK
 CLOSING = 4.0
-"""Smallest number of steps in which the volume of a tet may go to zero at the rate of the last step; chosen value:
-close to 4.3, which the default viscosity requires. After a step of this size the error of p = -K ln J is 0.5 %
-(docs/theory/time_integration.md)."""
+"""Smallest number of steps in which the volume of a tet may go to zero at the rate of the last step. Chosen value:
+close to 4.3, which the default viscosity requires. After a step of the largest allowed size the error of p = -K ln J is
+0.5 % (docs/theory/time_integration.md)."""
 LENGTH_FACTOR = 1.2009369551760027
 """Value of V^(1/3) sqrt(sum |grad N|^2) for a regular tet: sqrt(6) / (6 sqrt(2))^(1/3). The length LENGTH_FACTOR /
 sqrt(sum |grad N|^2) is V^(1/3) for a regular tet, and decreases with the altitude of a flat tet."""
@@ -19,9 +19,10 @@ sqrt(sum |grad N|^2) is V^(1/3) for a regular tet, and decreases with the altitu
 
 @njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def step_limit(w, s, n):  # type: ignore[no-untyped-def]
-    """Sets LIMIT to c sqrt(sum |grad N|^2), which is 1 / largest stable step, 1/s; NaN if the volume is not positive.
+    """Sets the row LIMIT to c sqrt(sum |grad N|^2), which is 1 / largest stable step, 1/s; NaN if the volume is not
+    positive.
 
-    Twice this value is at least the highest frequency of a tet with lumped mass (derived in
+    Twice the value of LIMIT is at least the highest frequency of a tet with lumped mass (derived in
     docs/theory/time_integration.md).
     """
     for i in range(n):
@@ -31,8 +32,8 @@ def step_limit(w, s, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True)
 def motion_limit(w, n):  # type: ignore[no-untyped-def]
-    """Raises LIMIT to CLOSING times SPEED, the rate of change of the volume divided by the volume, 1/s; a NaN does not
-    change.
+    """Raises the row LIMIT to CLOSING times the row SPEED if it is smaller. SPEED is the rate of change of the volume
+    divided by the volume, 1/s. A NaN remains NaN.
     """
     for i in range(n):
         rate = CLOSING * abs(w[SPEED + i])

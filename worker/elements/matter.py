@@ -1,4 +1,4 @@
-"""Material state at the nodes, in the averaged pressure forms: for pressures that are not linear in the volume strain.
+"""Material state at the nodes, in the averaged pressure forms, for pressures that are not linear in the volume strain.
 
 The volume strain of a node is a mean over its tets. Therefore each node has its own volume ratio and pores, and a
 pressure that is computed from volume ratio and pores. The pressure of a tet is the mean of its four nodes. The work of
@@ -22,11 +22,11 @@ from ..model.state import CHUNK, Floats
 from .scratch import CHANGE, MODULUS
 
 RATIO, PORES_AT, PRESSURE_AT, WORKED, TORN, OPENED, STIFF = range(7)
-"""Columns of the nodal material state. State: volume ratio; pores as in state.PORES; pressure, Pa. Values of the step
-per initial volume: work of the pressure, J/m^3; the part of this work that is dissipated in pores, J/m^3; volume of new
-pores. Last column: modulus of the wave speed, Pa."""
+"""Columns of the nodal material state. The state consists of the volume ratio, the pores (as in state.PORES) and the
+pressure, Pa. Then follow values of the step per initial volume: work of the pressure, J/m^3; the part of this work that
+is dissipated in pores, J/m^3; volume of new pores. Last column: modulus of the wave speed, Pa."""
 COLUMNS = 8
-"""Number of columns; it is one more than the number of used columns, so that a row is a cache line."""
+"""Number of columns; one more than the number of used columns, so that a row is a cache line."""
 TETS, LINEAR = range(2)
 """Places where the pressure is computed. TETS: in the tets; LINEAR: at the nodes, for a linear pressure with a tension
 cut-off."""
@@ -39,17 +39,17 @@ _TAKEN, _PLASTIC = WORK_AVERAGED * CHUNK, WORK_PLASTIC * CHUNK
 def pressure_place(eos, params):  # type: ignore[no-untyped-def]
     """Returns TETS or LINEAR for a part; ``eos``: number of its equation of state; ``params``: its constants.
 
-    The value is TETS for an equation of state with heat, because at the surface of a strong shock a node is compressed
-    more than the mean of four nodes (at 10 km/s more than a step resolves). With dilation the value is also TETS,
-    because the pressure then contains a part of the plastic flow of the tet.
+    The pressure is computed in the tets (TETS) for an equation of state with heat, because at the surface of a strong
+    shock a node is compressed more than the mean of four nodes (at 10 km/s more than a step resolves). With dilation
+    the value is also TETS, because the pressure then contains a part of the plastic flow of the tet.
     """
     return LINEAR if eos == 0 and params[SPALL] < np.inf and params[DILATES] == 0.0 else TETS
 
 
 @njit("void(float64[::1], float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
 def _book(at, params_bulk, old, before, after, opened):  # type: ignore[no-untyped-def]
-    """Sets WORKED, TORN and OPENED of a node whose volume ratio changes from ``before`` to ``after``. ``opened``:
-    volume of new pores.
+    """Sets the columns WORKED, TORN and OPENED of a node whose volume ratio changes from ``before`` to ``after``.
+    ``opened``: volume of new pores.
     """
     new = at[PRESSURE_AT]
     mean = 0.5 * (old + new)
@@ -60,8 +60,8 @@ def _book(at, params_bulk, old, before, after, opened):  # type: ignore[no-untyp
 
 @njit("void(float64[::1], float64[::1], float64)", cache=True, error_model="numpy")
 def _linear(at, params, strain):  # type: ignore[no-untyped-def]
-    """Updates the pressure of a node by p -= K d(volume strain). The pressure is limited from below by minus the spall
-    pressure; while the node has pores, the pressure is limited from above by zero.
+    """Updates the pressure of a node by p -= K d(volume strain). The pressure is at least minus the spall pressure.
+    While the node has pores, the pressure is at most zero.
     """
     bulk, spall = params[BULK], params[SPALL]
     old, pores, before, half = at[PRESSURE_AT], at[PORES_AT], at[RATIO], 0.5 * strain
@@ -96,8 +96,8 @@ def _mean(matter, tets, i, k):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def from_nodes(w, s, params, matter, tets, n):  # type: ignore[no-untyped-def]
-    """Sets pressure, work of the pressure, and MODULUS of ``n`` tets from the state at their nodes. Sets WORK_AVERAGED
-    to the work on the volume of the tet less the work at the nodes.
+    """Sets pressure, work of the pressure, and the row MODULUS of ``n`` tets from the state at their nodes. Sets the
+    row WORK_AVERAGED to the work on the volume of the tet minus the work at the nodes.
     """
     porous, shaped = params[SPALL] < np.inf, params[ORDER] == FROM_SHAPE
     for i in range(n):

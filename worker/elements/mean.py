@@ -1,10 +1,11 @@
-"""Energy account of the averaged pressure: work on the volume of a tet, less work on the averaged volume.
+"""Energy account of the averaged pressure: work on the volume of a tet, minus work on the averaged volume.
 
 The stress of a tet does the work -p dV on its own volume V. An averaged pressure stores the energy -p dW, where W is
-the volume that the averaged strain gives. Summed over the tets around a node the two agree if the pressure is uniform.
-The difference is added to WORK_AVERAGED of each tet. The difference contains three energies (docs/theory/elements.md,
-Energy of the averaging): recoverable energy that pressure differences within a mean store; energy dissipated if
-neighbours yield, tear or are removed at different times; and the dissipation of the stabilising fluxes of ``split``.
+the volume that results from the averaged strain. If the pressure is uniform, the sums of the two over the tets around a
+node are equal. The difference of the two works is added to the row WORK_AVERAGED of each tet. The difference of the two
+works contains three energies (docs/theory/elements.md, Energy of the averaging): recoverable energy that pressure
+differences within a mean store; energy dissipated if neighbours yield, tear or are removed at different times; and the
+dissipation of the stabilising fluxes of ``split``.
 """
 
 from ..kernels.jit import njit
@@ -19,8 +20,8 @@ _P, _GROWN, _TAKEN = PRESSURE * CHUNK, DILATION * CHUNK, WORK_AVERAGED * CHUNK
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def keep_before(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Sets BEFORE to the pressure before the step, CHANGE_SEEN to the change of the averaged volume, and VOLUME_SEEN to
-    the averaged volume at mid-step.
+    """Sets three rows: BEFORE is the pressure before the step, CHANGE_SEEN is the change of the averaged volume, and
+    VOLUME_SEEN is the averaged volume at mid-step.
 
     This function must be called before the equation of state; on entry VOLUME_SEEN is the averaged volume at the start
     of the step. A material that dilates uses its own volume, because its pressure does not determine a volume, and its
@@ -43,11 +44,11 @@ def keep_before(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def book_averaged(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Adds to WORK_AVERAGED the work of the mean pressure of the step on the volume of the tet, less its work on the
-    averaged volume.
+    """Adds a work to the row WORK_AVERAGED: the work of the mean pressure of the step on the volume of the tet, minus
+    its work on the averaged volume.
 
-    The stress of a material that dilates acts on its own volume; if the dilation of neighbours increases this volume,
-    more energy is stored.
+    The stress of a material that dilates acts on its own volume. If the dilation of neighbours increases the volume of
+    the tet, more energy is stored.
     """
     dilates = params[DILATES] > 0.0
     for i in range(n):

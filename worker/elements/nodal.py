@@ -11,19 +11,19 @@ from .records import MEANS
 
 _FLAG, _F1 = types.boolean, types.float64[::1]
 COMPLETE = (MEANS, _F1, _FLAG, _F1, _FLAG, types.int32[::1], types.int64[::1], types.float64[:, ::1])
-"""Types of the arguments of ``complete``: means; (nodes,) array for volumes; whether heat or bulking is averaged;
-(nodes,) bulk modulus, Pa; whether there are nodal pressures; (nodes,) part of each node; (parts,) TETS or LINEAR;
+"""Types of the arguments of ``complete``: means; (nodes,) array for volumes; flag, True if heat or bulking is averaged;
+(nodes,) bulk modulus, Pa; flag, True if there are nodal pressures; (nodes,) part of each node; (parts,) TETS or LINEAR;
 (parts, SIZE) constants."""
 PROJECT = (MEANS, _F1, types.float64)
-"""Types of the arguments of ``project``: means, nodal volumes, and the quanta per newton of the sums."""
+"""Types of the arguments of ``project``: means, nodal volumes, and number of quanta per newton of the sums."""
 _complete, _project = reader(*COMPLETE), reader(*PROJECT)
 
 
 @njit(TASK, cache=True, error_model="numpy")
 def complete(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: computes nodal values from completed sums, and sets the sums to zero; the values are the volume strain of
-    the step, heat or bulking, nodal pressures at n+1, and nodal volumes, m^3, for ``project``. A node without tets has
-    the strain zero.
+    """Task: computes nodal values from completed sums, and sets the sums to zero. The nodal values are the volume
+    strain of the step, heat or bulking, nodal pressures at n+1, and nodal volumes, m^3; ``project`` uses the volumes. A
+    node without tets has the strain zero.
     """
     means, volumes, more, bulk, pressed, part, kinds, params = _complete(table)
     sums, strain, extra, split, matter = means.sums, means.strain, means.more, means.split, means.matter

@@ -16,8 +16,8 @@ class NodalMeans:
 
     def __init__(self, weight: Floats, bulk: Floats, columns: int, *, split: bool, pressed: bool) -> None:
         """``weight`` (rows,): 1 / reference volume, 1/m^3; ``bulk`` (rows,): bulk modulus, Pa; ``columns``: number of
-        columns of the sums; ``split``: whether pressure gradients stabilise; ``pressed``: whether there are nodal
-        pressures.
+        columns of the sums; ``split``: True if pressure gradients stabilise the volume strain; ``pressed``: True if
+        there are nodal pressures.
         """
         n, of_split = len(weight), len(weight) if split else 1
         self.weight, self.bulk, self.split, self.pressed = weight, bulk, split, pressed
@@ -43,7 +43,7 @@ class NodalMeans:
         )  # fmt: skip
 
     def grow(self, parents: Ints) -> None:
-        """Appends one row for each of ``parents``, with the values of the parent row."""
+        """Appends one row for each row in ``parents``, with the values of that row."""
         names = ["weight", "bulk", "sums", "strain", "more"]
         names += ["gradient", "projected", "pressure", "volumes"] if self.split else []
         names += ["matter"] if self.pressed else []
@@ -53,11 +53,11 @@ class NodalMeans:
 
     @property
     def stored(self) -> dict[str, "np.ndarray"]:
-        """Returns the columns for a checkpoint, keyed by name."""
+        """Returns a dictionary of the columns for a checkpoint; the keys are the names of the columns."""
         names = ["_weight", *(["pressure", "_projected"] if self.split else []), *(["_matter"] if self.pressed else [])]
         return {name: getattr(self, _STORED[name]) for name in names}
 
     def restore(self, columns: dict[str, "np.ndarray"]) -> None:
-        """Sets the columns to those of a checkpoint."""
+        """Sets the columns of the means to those of a checkpoint."""
         for name, column in columns.items():
             setattr(self, _STORED[name], column)

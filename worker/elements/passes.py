@@ -11,15 +11,15 @@ Values = tuple[Any, ...]
 
 
 class BlockPass:
-    """Pass of a kernel whose arguments have the types ``kinds``: Motion, Body, Marks if ``marked``, Scratches, Means if
-    the form has means, numbers.
+    """Pass of a kernel over the tets. ``kinds``: types of the arguments of the kernel: Motion, Body, Marks if
+    ``marked``, Scratches, Means if the form has means, and numbers.
     """
 
     def __init__(self, kernel: Kernel, kinds: tuple[object, ...], *, marked: bool = True) -> None:
         self.kernel = kernel
         self._kinds, self._marked = kinds, marked
         self._tables: dict[int, Arguments] = {}
-        """Tables of arguments, keyed by part."""
+        """Tables of arguments; the keys are the parts."""
 
     def address(self, nodes: Nodes, block: Block, scratches: Scratches, means: Values, numbers: Values) -> int:
         """Returns the address of the table of arguments for a block. ``means``: the fields of Means (averages over
@@ -30,8 +30,8 @@ class BlockPass:
     def bind(
         self, nodes: Nodes, block: Block, scratches: Scratches, means: Values, numbers: Values
     ) -> tuple[int, tuple[Tie, ...]]:  # fmt: skip
-        """Returns the address of the table for use in a program of stages, and the words that follow its numbers
-        (arguments.py).
+        """Returns the address of the table for a program of stages. Also returns the words of the table that depend on
+        numbers of the program (arguments.py).
         """
         return self._table(block).bind(*self._records(nodes, block), scratches, means, *numbers)
 

@@ -1,16 +1,16 @@
 """Averaged pressure forms. The pressure of a tet is computed from a volume strain that is averaged over its nodes.
 
-One-point tets with their own pressure lock in plastic flow. ``nodal`` replaces the volume strain of a tet by the mean
-of the values of its nodes; the value of a node is the volume-weighted mean over the tets around the node (averaged
-nodal pressure, Bonet and Burton 1998, in rate form). The pressure is stored for each tet, so that any equation of state
-can be used and the separation of a node changes no pressure. ``split`` adds the projection form of the operator split
-for pressure gradients to the nodal balance (Zienkiewicz et al. 1998). The term of ``split`` is an Oñate-Codina
-stabilisation: it is proportional to the difference between the pressure gradient of a tet and the mean of the projected
-gradients of its nodes. The stabilisation vanishes for a linear pressure. Heat and bulking are averaged in the same way
-as the volume strain (heat_and_bulking.py).
+Tets with one integration point and their own pressure lock in plastic flow. The form ``nodal`` replaces the volume
+strain of a tet by the mean of the values of its nodes. The value of a node is the volume-weighted mean over the tets
+around the node (averaged nodal pressure, Bonet and Burton 1998, in rate form). The pressure is stored for each tet, so
+that any equation of state can be used and the separation of a node changes no pressure. The form ``split`` adds the
+projection form of the operator split for pressure gradients to the nodal balance (Zienkiewicz et al. 1998). The term of
+``split`` is an Oñate-Codina stabilisation: it is proportional to the difference between the pressure gradient of a tet
+and the mean of the projected gradients of its nodes. The stabilisation vanishes for a linear pressure. Heat and bulking
+are averaged in the same way as the volume strain (heat_and_bulking.py).
 
-Nodal sums are integers. Each contribution is divided by the reference volume of the node and is therefore of order one
-for any size of tets; for this reason one fixed scale, QUANTA, is sufficient for all cases.
+Nodal sums are integers. Each contribution is divided by the reference volume of the node. Therefore it is of order one
+for any size of tets, and one fixed scale, QUANTA, is sufficient for all cases.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ from .forces import largest_of, quanta
 from .scratch import CHANGE, DILATATION, EDGE, NODAL, SEEN, SPEED, VOLUME, VOLUME_MID, VOLUME_SEEN
 
 QUANTA = float(2**52)
-"""Number of quanta for a volume strain of 1, and for a relative nodal volume of 1."""
+"""Number of quanta for a volume strain of 1, and number of quanta for a relative nodal volume of 1."""
 
 _FLUX, _VOLUME, _MASS = VOLUME_FLUX * CHUNK, TET_VOLUME * CHUNK, MASS * CHUNK
 _WORK, _P, _GROWN = WORK * CHUNK, PRESSURE * CHUNK, DILATION * CHUNK
@@ -48,7 +48,8 @@ def subtract_dilation(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     dilation instead.
 
     In the last step the law added the tet's own dilation to the pressure, so that the stress was on the yield surface.
-    This function subtracts the dilation and its work. Afterwards DILATATION is the trace of the elastic strain rate.
+    The function ``subtract_dilation`` subtracts the dilation and the work of the dilation. Afterwards DILATATION is the
+    trace of the elastic strain rate.
     """
     if dt <= 0.0:
         return
@@ -63,8 +64,8 @@ def subtract_dilation(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def recall_flux(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Sets CHANGE to the change of the tet's own volume in the step, m^3, and SPEED to its rate divided by the volume
-    at the end, 1/s.
+    """Sets the row CHANGE to the change of the tet's own volume in the step, m^3. Sets the row SPEED to its rate
+    divided by the volume at the end, 1/s.
     """
     for i in range(n):
         w[CHANGE + i] = s[_FLUX + i] * dt
@@ -73,7 +74,7 @@ def recall_flux(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def recall_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Does the same as ``recall_flux`` for tets that store their volume; also stores the present volume."""
+    """Does the same as ``recall_flux`` for tets that store their volume. Also stores the present volume."""
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):
         volume = w[VOLUME + i]
@@ -157,14 +158,14 @@ def stabilise(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
 def gather_strains(w, strain, tets, n):  # type: ignore[no-untyped-def]
-    """Sets SEEN to the mean over the four nodes of the volume strain of the step."""
+    """Sets the row SEEN to the mean over the four nodes of the volume strain of the step."""
     for i in range(n):
         w[SEEN + i] = 0.25 * ((strain[tets[i, 0]] + strain[tets[i, 1]]) + (strain[tets[i, 2]] + strain[tets[i, 3]]))
 
 
 @njit("void(float64[::1], int64, float64)", cache=True)
 def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
-    """Sets SEEN, VOLUME_SEEN, CHANGE and SPEED in the ``standard`` form, in which each tet uses its own volume
+    """Sets the rows SEEN, VOLUME_SEEN, CHANGE and SPEED in the ``standard`` form, in which each tet uses its own volume
     strain.
     """
     for i in range(n):
@@ -176,7 +177,7 @@ def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def own_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Does the same as ``own_strains`` for tets that store their volume; also stores the present volume."""
+    """Does the same as ``own_strains`` for tets that store their volume. Also stores the present volume."""
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):
         volume = w[VOLUME + i]

@@ -11,8 +11,8 @@ from . import scratch
 
 LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
 """Indices in ``Scratch.peaks``: bit pattern of the largest 1 / stable step, 1/s; smallest global id of the tets that
-have this value; bit pattern of the largest force, N; state of the tets that erosion will remove (wear.py); whether
-faces are overstressed (hot.py)."""
+have this value; bit pattern of the largest force, N; state of the tets that erosion will remove (wear.py); flag for
+overstressed faces (hot.py)."""
 PEAKS = 5
 """Number of values in ``Scratch.peaks``."""
 _LINE = 8
@@ -52,20 +52,20 @@ class Body(NamedTuple):
     quiet: Ints
     """(chunks, 3) marks of the chunks that are at rest, see rest.py."""
     flat: Flags
-    """(n,) whether a tet is flat, so that its volume strain is not averaged; (0,) if no tet is flat."""
+    """(n,) True for each flat tet, whose volume strain is not averaged; (0,) if no tet is flat."""
     averages: Tets
-    """(n, 4) for each corner of a tet the row of its node in Means."""
+    """(n, 4) for each corner of a tet, the row of its node in Means."""
 
 
 class Marks(NamedTuple):
     """Limits with which the passes compare the tets of a block, and the marks of tets beyond a limit."""
 
     worn: Flags
-    """(n,) whether erosion will remove a tet; (0,) if the part does not erode."""
+    """(n,) True for each tet that erosion will remove; (0,) if the part does not erode."""
     life: Floats
     """(5,) limits beyond which erosion removes a tet, see wear.py."""
     hot: Bits
-    """(n,) one bit for each overstressed face, see hot.py; (0,) if the part does not fracture."""
+    """(n,) overstressed faces of each tet, one bit for each face, see hot.py; (0,) if the part does not fracture."""
     weakest: Floats
     """(n,) smallest strength of the faces of each tet, Pa."""
     shear: float
@@ -120,7 +120,7 @@ class Means(NamedTuple):
     more: Floats
     """(rows,) mean heat or bulking of the step."""
     split: bool
-    """True if pressure gradients stabilise; if False, the arrays after this field have one row."""
+    """True if pressure gradients stabilise the volume strain. If False, the arrays after this field have one row."""
     pressure: Floats
     """(rows,) nodal pressure, Pa."""
     projected: Floats
@@ -128,7 +128,7 @@ class Means(NamedTuple):
     gradient: Ints
     """(rows, 3) sums of the pressure gradient, quanta."""
     matter: Floats
-    """(rows, COLUMNS) nodal material state, see matter.py; one row if there are no nodal pressures."""
+    """(rows, COLUMNS) nodal material state, see matter.py. The array has one row if there are no nodal pressures."""
 
     @classmethod
     def none(cls) -> "Means":
@@ -138,7 +138,7 @@ class Means(NamedTuple):
 
 
 motion_of = attrgetter("x0", "x", "v", "force")
-"""Returns the fields for Motion from a ``Nodes``."""
+"""Returns the fields for Motion. The argument is an object of the class ``Nodes``."""
 body_of = attrgetter("tets", "id", "flat_state", "rows", "params", "kind", "eos", "quiet", "flat", "averages")
 """Returns the fields for Body from a block."""
 marks_of = attrgetter("worn", "life", "hot", "weakest", "shear_weight")

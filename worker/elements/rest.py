@@ -1,10 +1,10 @@
 """Chunks at rest: chunks of tets that no wave has reached yet. A pass over a chunk at rest changes no value. Therefore
 the pass is omitted, and the results are identical.
 
-A chunk is noted as at rest after a complete pass under three conditions: all its nodes had zero velocity, every bit of
-its state was unchanged, and the pass made no force. A further pass would have the same result and the same stable step.
-The reason is that a pass depends only on the state, the nodal velocities, the positions, which are constant at rest,
-and the time step, which is multiplied by zeros.
+A chunk is marked as at rest after a complete pass under three conditions: all its nodes had zero velocity, the pass
+changed no bit of its state, and the pass computed zero forces. A further pass would have the same result and the same
+stable step. The results are equal because a pass depends only on the state, the nodal velocities, the positions, which
+are constant at rest, and the time step, which is multiplied by zeros.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from .scratch import LIMIT
 
 NOTED, TET, STEADY = range(3)
 """Indices in the row of a chunk in ``Block.quiet``. NOTED: bit pattern of its largest 1 / stable step, 1/s; 0 if the
-chunk is not noted as at rest. TET: smallest global id of its tets that have this limit. STEADY: 1 if the first of two
+chunk is not marked as at rest. TET: smallest global id of its tets that have this limit. STEADY: 1 if the first of two
 passes left its state unchanged."""
 
 
@@ -52,8 +52,8 @@ def same(before, after):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64[::1], int64[::1], int64)", cache=True)
 def note(quiet, bits, ids, n):  # type: ignore[no-untyped-def]
-    """Notes a chunk as at rest. Stores the limit from the pass over the chunk, and the smallest id of the tets with
-    this limit.
+    """Marks a chunk as at rest. Stores the largest 1 / stable step from the pass over the chunk, and the smallest id of
+    the tets that have it.
     """
     limit, first = 0, 0
     for i in range(n):
@@ -65,8 +65,8 @@ def note(quiet, bits, ids, n):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64[::1], int64, int64)", cache=True)
 def pass_over(peaks, quiet, place, tet):  # type: ignore[no-untyped-def]
-    """Raises the ``peaks`` to the values of a chunk that is noted as at rest: its limit goes to index ``place``, the
-    smallest id of the tets with this limit to index ``tet``.
+    """Updates the ``peaks`` with the values of a chunk that is marked as at rest. Its largest 1 / stable step goes to
+    index ``place``, the smallest id of the tets that have it to index ``tet``.
     """
     if quiet[NOTED] > peaks[place]:
         peaks[place], peaks[tet] = quiet[NOTED], quiet[TET]

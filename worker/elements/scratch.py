@@ -1,15 +1,16 @@
-"""First places of the rows in the scratch memory of a thread; a row has CHUNK float64 numbers.
+"""First places of the rows in the scratch memory of a thread. A row has CHUNK float64 numbers.
 
-Each pass and each law uses the rows from NODAL to MOVED for its own values; the second pass of the averaged pressure
+Each pass and each law uses the rows from NODAL to MOVED for its own values. The second pass of the averaged pressure
 forms uses the four rows from CORNER_CHANGE on.
 """
 
 from ..model.state import CHUNK
 
 EDGE = 0
-"""9 rows: edges e1, e2, e3, m; later area vectors b1, b2, b3 at the end of the step, m^2 (tet4.py)."""
+"""Nine rows: edges e1, e2, e3, m; after the gradients are computed, area vectors b1, b2, b3 at the end of the step, m^2
+(tet4.py)."""
 RATE = 9 * CHUNK
-"""9 rows: velocity differences, m/s; later rate of deformation D, and SPIN."""
+"""Nine rows: velocity differences, m/s; after the rates are computed, rate of deformation D, and SPIN."""
 D_XX, D_YY, D_ZZ, D_YZ, D_ZX, D_XY = (RATE + k * CHUNK for k in range(6))
 SPIN = RATE + 6 * CHUNK
 """3 rows: axial vector of dt/2 times the spin."""

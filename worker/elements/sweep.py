@@ -49,7 +49,7 @@ def standard_pass(motion, body, marks, room, begin, end, dt, scale):  # type: ig
         t, s = tets[c * CHUNK : (c + 1) * CHUNK], state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         first, last, n = c * CHUNK, c * CHUNK + len(t), len(t)
         ids, quiet = body.id[first:last], noted[c]
-        # 1. Skip a chunk whose nodes have not moved: its arrays have the result of its last pass.
+        # 1. Skip a chunk whose nodes have not moved. Its arrays contain the result of its last pass.
         still = dt > 0.0 and rest.at_rest(v, t, n)
         if still and quiet[rest.NOTED] > 0:
             rest.pass_over(peaks, quiet, LARGEST_LIMIT, LIMITING_TET)
@@ -92,8 +92,8 @@ def strain_pass(motion, body, marks, room, means, begin, end, dt):  # type: igno
     """Computes the nodal sums of volume and volume change, which include the stabilising fluxes if the form is
     ``split``. Computes the deviatoric stress at n+1, if the law does not need the pressure.
 
-    A law from the undeformed shape is applied here if the nodes need its work for their heat, else in ``force_pass``;
-    for a chunk noted as at rest only the volumes are computed, because the nodal means need them.
+    A law from the undeformed shape is applied here if the nodes need its work for their heat, else in ``force_pass``.
+    For a chunk marked as at rest only the volumes are computed, because the nodal means need them.
     """
     x0, x, v, w = motion.x0, motion.x, motion.v, room.w
     tets, state, params, rows, strength = body.tets, body.state, body.params, body.rows, body.strength

@@ -16,7 +16,7 @@ _standard, _strains, _forces, _again = reader(*STANDARD), reader(*STRAINS), read
 
 @njit(TASK, cache=True, error_model="numpy")
 def standard(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``sweep.standard_pass``."""
+    """Task: runs ``sweep.standard_pass`` for a range of chunks."""
     motion, body, marks, rooms, dt, scale = _standard(table)
     scratch = Scratch(rooms.w[thread], rooms.wi[thread], rooms.bits[thread], rooms.peaks[thread])
     sweep.standard_pass(motion, body, marks, scratch, begin, end, dt, scale)
@@ -24,7 +24,7 @@ def standard(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def strains(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``sweep.strain_pass``."""
+    """Task: runs ``sweep.strain_pass`` for a range of chunks."""
     motion, body, marks, rooms, means, dt = _strains(table)
     scratch = Scratch(rooms.w[thread], rooms.wi[thread], rooms.bits[thread], rooms.peaks[thread])
     sweep.strain_pass(motion, body, marks, scratch, means, begin, end, dt)
@@ -32,7 +32,7 @@ def strains(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def forces(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``sweep.force_pass``."""
+    """Task: runs ``sweep.force_pass`` for a range of chunks."""
     motion, body, marks, rooms, means, dt, scale = _forces(table)
     scratch = Scratch(rooms.w[thread], rooms.wi[thread], rooms.bits[thread], rooms.peaks[thread])
     sweep.force_pass(motion, body, marks, scratch, means, begin, end, dt, scale)
@@ -40,7 +40,7 @@ def forces(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def again(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``sweep.forces_again``."""
+    """Task: runs ``sweep.forces_again`` for a range of chunks."""
     motion, body, rooms, means, scale = _again(table)
     scratch = Scratch(rooms.w[thread], rooms.wi[thread], rooms.bits[thread], rooms.peaks[thread])
     sweep.forces_again(motion, body, scratch, means, begin, end, scale)

@@ -53,18 +53,19 @@ fetched twice."""
 
 @njit("void(float64[::1], int64, int64)", cache=True, forceinline=True)
 def _prefetch_tet(ahead, i, rows):  # type: ignore[no-untyped-def]
-    """Prefetches ``rows`` numbers of tet ``i`` from the array ``ahead``, which the next kernel reads. The prefetch
-    overlaps with the reading of other arrays."""
+    """Prefetches ``rows`` numbers of tet ``i`` from the array ``ahead``, which the next kernel reads. The prefetch runs
+    at the same time as the reading of other arrays."""
     for j in range(0, rows, _LINE):
         prefetch(ahead, i * rows + j)
 
 
 @njit("void(float64[::1], float64[:, ::1], uint32[:, ::1], float64[::1], int64)", cache=True, error_model="numpy")
 def gather(rows, values, tets, ahead, n):  # type: ignore[no-untyped-def]
-    """Sets nine ``rows`` to the values of nodes 1, 2, 3 less the value of node 0; ``values`` (nodes, 3): nodal values.
+    """Sets nine ``rows`` to the values of nodes 1, 2, 3 minus the value of node 0; ``values`` (nodes, 3): nodal values.
 
-    With positions the result is the edges, in the rows from EDGE on; with velocities it is the velocity differences, in
-    the rows from RATE on. ``ahead``: state rows to be prefetched into the cache, or an empty array.
+    If the values are positions, the result is the edges, in the rows from EDGE on. If the values are velocities, the
+    result is the velocity differences, in the rows from RATE on. ``ahead``: state rows to be prefetched into the cache,
+    or an empty array.
     """
     near, whole = len(ahead) // CHUNK, n // FOUR * FOUR
     for i in range(0, whole, FOUR):
@@ -86,8 +87,8 @@ def gather(rows, values, tets, ahead, n):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def gather_moved(w, x0, x, tets, ahead, n):  # type: ignore[no-untyped-def]
-    """Sets EDGE to the edges, and MOVED to the displacements of nodes 1, 2, 3 less the displacement of node 0.
-    ``ahead``: see ``gather``.
+    """Sets the rows EDGE to the edges, and the rows MOVED to the displacements of nodes 1, 2, 3 minus the displacement
+    of node 0. ``ahead``: see ``gather``.
     """
     near, whole = len(ahead) // CHUNK, n // FOUR * FOUR
     for i in range(0, whole, FOUR):
@@ -162,7 +163,7 @@ def kinematics(w, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def at_rest(w, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_MID and DILATATION of tets at rest to the values that ``kinematics`` would give."""
+    """Sets the rows VOLUME_MID and DILATATION of tets at rest to the values that ``kinematics`` would give."""
     for i in range(n):
         e1x, e1y, e1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
         e2x, e2y, e2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
@@ -174,7 +175,7 @@ def at_rest(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def volumes(w, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME from the edges, bit-identical to the result of ``end_gradients``."""
+    """Sets the row VOLUME from the edges. The result is bit-identical to that of ``end_gradients``."""
     for i in range(n):
         e1x, e1y, e1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
         e2x, e2y, e2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
@@ -186,10 +187,10 @@ def volumes(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_MID to the mean of VOLUME and the volume before the step. Sets DILATATION to the difference of the
-    two volumes divided by VOLUME_MID and dt.
+    """Sets the row VOLUME_MID to the mean of VOLUME and the volume before the step. Sets the row DILATATION to the
+    difference of the two volumes, divided by VOLUME_MID and dt.
 
-    The values are equal to those of ``kinematics`` up to terms of third order in the step. With dt = 0 the change is
+    The two rows are equal to those of ``kinematics`` up to terms of third order in the step. If dt is 0, the change is
     zero.
     """
     frequency = 1.0 / dt if dt > 0.0 else 0.0
@@ -203,14 +204,16 @@ def growth(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64)", cache=True)
 def unchanged(w, s, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_MID and DILATATION of tets at rest that store their volume."""
+    """Sets the rows VOLUME_MID and DILATATION of tets at rest that store their volume."""
     for i in range(n):
         w[VOLUME_MID + i], w[DILATATION + i] = s[_VOLUME + i], 0.0
 
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def end_gradients(w, n):  # type: ignore[no-untyped-def]
-    """Replaces the edges by b1, b2, b3 (m^2). Sets VOLUME (m^3), and AREAS to the sum of |b|^2 over the four nodes."""
+    """Replaces the edges by b1, b2, b3 (m^2). Sets the row VOLUME (m^3), and the row AREAS to the sum of |b|^2 over the
+    four nodes.
+    """
     for i in range(n):
         e1x, e1y, e1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
         e2x, e2y, e2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
@@ -235,8 +238,8 @@ def end_gradients(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def speeds(w, n):  # type: ignore[no-untyped-def]
-    """Sets SPEED to the rate of change of the volume divided by the volume, 1/s. The rate is computed from V grad N and
-    the velocity differences.
+    """Sets the row SPEED to the rate of change of the volume divided by the volume, 1/s. The rate is computed from V
+    grad N and the velocity differences.
     """
     for i in range(n):
         ax, ay, az, bx, by, bz, cx, cy, cz = _rates(w, i)

@@ -1,6 +1,6 @@
 """Tets that erosion will remove, because of their plastic strain, damage, volume or stable step.
 
-A tet that becomes flat or inverted must be removed before its altitude passes zero; its velocity gradient is
+A tet that becomes flat or inverted must be removed before its altitude passes zero, because its velocity gradient is
 proportional to 1 / altitude, so a single such tet would accelerate its nodes without bound. A marked tet is removed in
 the next step. The removal of a tet that exceeds only a strain or damage limit is delayed until several tets are removed
 together (worker/erosion.py).
@@ -44,7 +44,7 @@ _MASS, _STRAIN, _DAMAGE = MASS * CHUNK, PLASTIC_STRAIN * CHUNK, DAMAGE * CHUNK
 
 
 def life(erosion: Erosion | None) -> Floats:
-    """(5,) limits beyond which erosion removes tets of a part; the limit of the stable step is set after the first
+    """(5,) limits beyond which erosion removes tets of a part. The limit of the stable step is set after the first
     step.
     """
     if erosion is None:
@@ -72,8 +72,8 @@ def _release(s, i):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[::1], int64)", cache=True, error_model="numpy")
 def any_inverted(w, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME to the volume at the end of the step, as tet4.end_gradients does. Returns True if a tet of the chunk
-    is inverted.
+    """Sets the row VOLUME to the volume at the end of the step, in the same way as tet4.end_gradients. Returns True if
+    a tet of the chunk is inverted.
     """
     least = np.inf
     for i in range(n):
@@ -90,8 +90,8 @@ def any_inverted(w, n):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 2)(float64[::1], float64[:, ::1], float64[:, ::1], uint32[::1], int64, float64)", cache=True)
 def _half_of_last(s, x, v, tet, i, dt):  # type: ignore[no-untyped-def]
-    """Returns half of the work that the nodes of tet ``i`` do against the forces of the tet at n, on the way from n to
-    n+1, J. The work is returned in two parts: without viscosity, and of viscosity.
+    """Returns half of the work that the nodes of tet ``i`` do against the forces of the tet at n, during the motion
+    from n to n+1, J. The work is returned in two parts: without viscosity, and of viscosity.
 
     The formula is 1/2 dt sum v_a . (stress b_a), b_a = V grad N_a at x(n) = x(n+1) - dt v.
     """

@@ -1,4 +1,4 @@
-"""Work of the elements by part, as exact sums."""
+"""Work of the elements of each part, as exact sums."""
 
 import numpy as np
 
@@ -15,11 +15,11 @@ _F1, _F2, _F3, _I = types.float64[::1], types.float64[:, ::1], types.float64[:, 
 _LARGEST, _LIMBS = (_F2, _F3, _I), (types.int64[:, :, ::1], _F3, _I, _F1)
 _of_largest, _of_limbs = reader(*_LARGEST), reader(*_LIMBS)
 _CHUNKS = 16
-"""Number of chunks in a task. Chosen value: a task takes some 10 us; to start a parallel region takes 2 us."""
+"""Number of chunks in a task. Chosen value: a task takes about 10 us; the start of a parallel region takes 2 us."""
 
 
 class ElementWork:
-    """Sums of the columns WORKS over all tets, by part, J, computed from the state (fixed_point.Columns)."""
+    """Sums of the columns WORKS over all tets of each part, J, computed from the state (fixed_point.Columns)."""
 
     def __init__(self, model: Model, team: Team) -> None:
         self._largest = Pass(team, _largest, *_LARGEST, size=_CHUNKS)
@@ -47,8 +47,8 @@ class ElementWork:
 
 @njit(TASK, cache=True, error_model="numpy")
 def _largest(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: sets the row of the task in ``largest`` (tasks, 4) to the magnitudes of WORKS of the ``n`` tets in some
-    chunks.
+    """Task: sets the row of the task in ``largest`` (tasks, 4) to the largest magnitudes of WORKS of the ``n`` tets in
+    some chunks.
     """
     largest, state, n = _of_largest(table)
     for j in range(len(WORKS)):
@@ -60,7 +60,9 @@ def _largest(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def _limbs(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: sets the limbs of the task in ``words`` (tasks, 2, 4): of WORKS of the ``n`` tets in some chunks."""
+    """Task: sets the limbs of the task in ``words`` (tasks, 2, 4) to the sums of WORKS of the ``n`` tets in some
+    chunks.
+    """
     words, state, n, scale = _of_limbs(table)
     mine = words[first // _CHUNKS]
     mine[:] = 0

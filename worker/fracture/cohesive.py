@@ -145,8 +145,8 @@ class Cohesion:
     @staticmethod
     def energies(sums: Floats, gone: Floats) -> tuple[float, float, float]:
         """Returns three energies of all facets inserted so far, J: dissipated energy, energy recoverable by closing,
-        and fracture energy. ``sums``: energies of the present facets; ``gone``: energies of the failed facets. Both are
-        sums over all ranks.
+        and fracture energy. ``sums``: energies of the present facets, summed over all ranks; ``gone``: energies of the
+        failed facets, summed over all ranks.
         """
         work, reversible, whole = sums
         gone_work, gone_whole = gone

@@ -17,7 +17,7 @@ from ..parallel.team import TASK, Team, team
 
 _PART = 1 << 62
 """Offset that is larger than all tet ids. For each part without facets the graph has one more node, which connects all
-tets of the part. The number of this node is the offset plus the number of the part."""
+tets of the part. The number of the node of a part is the offset plus the number of the part."""
 _TETS = 4096
 """Number of tets in a task. Chosen value: in a bar of 55,000 tets, 7 % of the facets are between tets of two different
 tasks, and a single thread joins the tets at these facets."""

@@ -173,7 +173,7 @@ def _copy(place, face, shared, traction, m, i):  # type: ignore[no-untyped-def]
 @njit(types.int64(CANDIDATES, _I1, _I1), cache=True)
 def _joined(out, begins, counts):  # type: ignore[no-untyped-def]
     """Moves the rows of several ranges of ``out`` to the front of ``out``: ``counts[k]`` rows from row ``begins[k]``
-    on. Returns the total number of these rows.
+    on. Returns the total number of rows that were moved.
     """
     m = 0
     for k in range(len(counts)):

@@ -25,8 +25,8 @@ ELSEWHERE = -2
 
 @dataclass
 class Body:
-    """The facets of a block of tets that break by one law. These are either all facets between tets of the block, or
-    all facets between the block and another part that a bond joins.
+    """The facets of a block of tets that break by one law: either all facets between tets of the block, or all facets
+    between the block and another part that a bond joins.
     """
 
     index: int

@@ -74,8 +74,8 @@ class Initiation:
         return [some for some in every if some is not None]
 
     def candidates(self) -> list[tuple[Body, Candidates]]:
-        """Returns the bodies that have candidate facets, and these facets. This function must be called once in each
-        step, because it advances the clocks. It is collective among the same ranks as ``breaking``.
+        """Returns the bodies that have candidate facets, and these facets; to be called once in each step, because it
+        advances the clocks. The function is collective among the same ranks as ``breaking``.
         """
         self.interface.exchange(self._model.nodes.x)
         x, t = self._model.nodes.x, self._clock.t

@@ -13,7 +13,7 @@ from .columns import Facets
 
 _LEAST = 0.05
 """Cohesive facets may use the fraction 1 - safety^2 of the square of the highest frequency that the time step resolves.
-This constant is the smallest value of that fraction."""
+The constant ``_LEAST`` is the smallest value of that fraction."""
 _SHARES = 24.0
 """Factor 4 * 3 * 2 in the stiffness limit of a facet. A node has a quarter of the mass of its tet, up to three faces of
 the tet open at the node, and both nodes of a pair move."""

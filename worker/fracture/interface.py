@@ -2,8 +2,8 @@
 facet compute the same mean traction.
 
 A facet breaks only if the traction of one of its tets reaches the strength. Therefore two ranks exchange tractions only
-in steps in which a facet shared by them is overstressed; a flag that shows this is sent with the forces of shared
-nodes.
+in steps in which a facet shared by them is overstressed; a flag for overstressed shared facets is sent with the forces
+of shared nodes.
 """
 
 import numpy as np
@@ -74,8 +74,8 @@ class Interface:
         self.hot = bool(self.facets.hot.any())
 
     def mark_inner(self, hot: bool) -> None:
-        """Marks the overstressed facets between two blocks of this rank. This function must be called after the stress
-        of all tets of the rank is computed. ``hot``: True if at least one face of the rank is overstressed.
+        """Marks the overstressed facets between two blocks of this rank; to be called after the stress of all tets of
+        the rank is computed. ``hot``: True if at least one face of the rank is overstressed.
         """
         if len(self._inner):
             self.facets.hot[-1] = 0

@@ -8,9 +8,9 @@ offset of the pair is first multiplied by a factor q below 1:
 
     d -> q d,   lent^2 -> max(lent^2 - (1 - q^2) D^2, 0),   k unchanged,
 
-With these values the recoverable energy k (D^2 - lent^2) / 2 does not change; with q = 0 no energy is recoverable. The
-remaining energy is the area under the law from ``lent`` on. The area consists of a triangle up to the knee and a
-triangle beyond the knee:
+After this change of the offset, the recoverable energy k (D^2 - lent^2) / 2 does not change; with q = 0 no energy is
+recoverable. The remaining energy is the area under the law from ``lent`` on. The area consists of a triangle up to the
+knee and a triangle beyond the knee:
 
     left = k (knee^2 - lent^2) / 2 + k knee critical / 2,   knee = top, or less if critical would be below 0.
 """

@@ -38,8 +38,9 @@ def stresses(
     """(nodes, 6) mean Cauchy stress xx, yy, zz, yz, zx, xy of nodes, Pa, without the viscous part. Computed for the
     ``wanted`` nodes and for the shared nodes of the bodies; zero at other nodes.
 
-    ``heaviest`` (parts,): mass of the heaviest tet of each part on all ranks, kg. The quantum of a sum depends on this
-    mass and on the strength of the part. Therefore two bodies in one call must not have a common node. Collective.
+    ``heaviest`` (parts,): mass of the heaviest tet of each part on all ranks, kg. The quantum of a nodal sum depends on
+    the mass of the heaviest tet and on the strength of the part. Therefore two bodies in one call must not have a
+    common node. Collective.
     """
     sums, strength = np.zeros((nodes.n, 7), np.int64), np.zeros(nodes.n)
     for other in neighbours:
@@ -82,8 +83,8 @@ def _add(sums, nodes, first, count, pool, mesh, of_stress, of_mass):  # type: ig
 
 def replace(found: Candidates, shared: InterfaceFacets, body: Body, stress: Floats, x: Floats) -> None:
     """Sets the tractions of candidates of ``body`` from the ``stress`` (nodes, 6) of their nodes, at the positions
-    ``x`` (nodes, 3). If the effective size of a new traction exceeds that of the mean traction of the two tets, it is
-    reduced to the latter.
+    ``x`` (nodes, 3). If the effective size of a new traction exceeds that of the mean traction of the two tets, the new
+    traction is reduced to the size of the mean traction.
     """
     _replace(found, shared, body.mesh, stress, x, body.law.weight, body.spec.friction)
 

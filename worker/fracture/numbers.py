@@ -13,8 +13,8 @@ UNKNOWN = -1
 
 
 def numbered(before: Ints, labels: Ints, first: int, comm: Comm) -> tuple[Ints, Ints]:
-    """Returns two arrays. The first (n,) is the fragment number of each tet. The second (k, 3) has the old number, the
-    new number, and the number of tets that have both; its rows are ascending and equal on all ranks. Collective.
+    """Returns two arrays: (n,) the fragment number of each tet; and (k, 3) the old number, the new number, and the
+    number of tets that have both. The rows of the second array are ascending and equal on all ranks. Collective.
 
     ``before`` (n,): old fragment numbers of the tets, or UNKNOWN; ``labels`` (n,): label of the fragment of each tet.
     New numbers start at ``first`` and have the order of the labels. If several pieces have equally many tets, the piece

@@ -38,8 +38,7 @@ class Record:
         self.count = 0
         """Number of fragments at the last ``update``."""
         self.initial = self.next = 0
-        """Number of fragments at the start. These fragments have the smallest numbers. The second value is the next
-        free number."""
+        """Number of fragments at the start, which have the smallest numbers; and next free number of a fragment."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the numbers of the last frame to a parcel (a checkpoint or migration message)."""

@@ -60,8 +60,8 @@ class Separation:
         self.first = math.nan
         """Simulated time at which the first facet broke, s."""
         self._mine = self.cut = _NO_NODES
-        """Local nodes, ascending, whose stars may be cut in this step. These are the nodes of facets that break and the
-        nodes of removed tets."""
+        """Local nodes, ascending, whose stars may be cut in this step: nodes of facets that break, and nodes of removed
+        tets."""
 
     def survey(self, broken: list[Indices], count: int, touched: Ints) -> None:
         """Marks facets as broken. Sets ``touched`` (ranks,) to 1 for each rank that has a node of a broken facet; the

@@ -91,8 +91,8 @@ class Fracture:
         return Removal(*of, self._elements, contact, self._comm)
 
     def unload(self) -> None:
-        """Unloads cohesive facets that would release more energy than they absorbed. This function must be called
-        before the kick. Collective.
+        """Unloads cohesive facets that would release more energy than they absorbed; to be called before the kick.
+        Collective.
         """
         if self.cohesion is not None and self.broken:
             self._unloading.apply(self._clock)

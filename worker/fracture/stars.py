@@ -199,10 +199,10 @@ class Pieces:
         """Returns the pieces that separate from their nodes, ordered by node and smallest tet. ``rows``: star rows,
         ordered by node and tet; ``begins`` (k + 1,): first row of each node.
 
-        The first result (r,) is the number of the piece of each row, valid until the next call. It is -1 for the piece
-        with the smallest tet, which keeps the node. Further results have one value for each piece: id of its node, id
-        of its smallest tet, index of the node among the nodes of ``rows``, rank of the smallest tet, and a quarter of
-        the mass of its tets, kg.
+        The first result (r,) is the number of the piece of each row, -1 for the piece with the smallest tet, which
+        keeps the node. The array is valid until the next call. Further results have one value for each piece: id of its
+        node, id of its smallest tet, index of the node among the nodes of ``rows``, rank of the smallest tet, and a
+        quarter of the mass of its tets, kg.
         """
         n = len(begins) - 1
         of, parent, many = (self._scratch.of(name, m) for name, m in (("of", len(rows)), ("p", len(rows)), ("m", n)))

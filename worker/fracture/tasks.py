@@ -24,7 +24,7 @@ def count(table, first, stop, thread):  # type: ignore[no-untyped-def]
 @njit(TASK, cache=True)
 def search(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """Task: runs ``criterion.overstressed`` and ``criterion.within``. The task writes to its own rows of ``out``:
-    ``counts[k]`` rows from row ``begins[k]`` on. Then it replaces the count by the number of candidates.
+    ``counts[k]`` rows from row ``begins[k]`` on. Then the task replaces its count by the number of candidates.
     """
     out, begins, counts, hot, mesh, facets, x, law = _search(table)
     k = first // TETS_OF_A_TASK

@@ -1,4 +1,4 @@
-"""The tets that a probe measures: those whose centre is in the region of the probe at the start."""
+"""Tets that a probe measures: the tets whose centre is in the region of the probe at the start."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ from ..scene.marks import held
 
 
 class ChosenTets:
-    """The tets on this rank that some probes of a case measure."""
+    """Tets on this rank that are measured by at least one probe of a case."""
 
     def __init__(self, case: Case, model: Model, numbers: Sequence[int]) -> None:
         """``numbers``: indices of the probes in the case."""
@@ -29,11 +29,11 @@ class ChosenTets:
         self._found: dict[int, list[tuple[Block, Ints]]] = {}
 
     def count(self, number: int) -> int:
-        """Return the number of tets of a probe on this rank at the start."""
+        """Return the number of tets on this rank, at the start, that a probe measures."""
         return sum(len(ids) for ids in self.ids[number])
 
     def changed(self) -> bool:
-        """Return whether tets were removed since the last call; True at the first call. If tets were removed, the tets
+        """Return True if tets were removed since the last call; True at the first call. If tets were removed, the tets
         of the probes are selected again.
         """
         if self._counted == (counted := [block.n for block in self._model.blocks]):

@@ -12,7 +12,7 @@ _AXES = "xyz"
 
 
 class Courses:
-    """The probes of the motion of walls. The probes have no state, and all ranks have equal walls."""
+    """Probes of the motion of walls. The probes have no state, and all ranks have equal walls."""
 
     def __init__(self, case: Case, scene: Scene) -> None:
         self._scene, names = scene, [wall.name for _, wall in case.boundaries_of(Wall)]

@@ -21,7 +21,7 @@ def tet_volumes(tets: Tets, x: Floats) -> Floats:
 
 
 def field(block: Block, name: str, model: Model, places: Ints) -> Floats:
-    """Return (n,) the values of a field of ``cases.schema.ProbeField`` for the tets at ``places`` (n,) of a block; the
+    """Return (n,) the values of a field (``cases.schema.ProbeField``) for the tets at ``places`` (n,) of a block. The
     stress includes the viscous part.
     """
 

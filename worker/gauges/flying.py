@@ -19,7 +19,7 @@ def held(scene: Scene) -> Ints:
 
 
 class Flying:
-    """The probes of fragments beyond a plane; the probes have no state."""
+    """Probes of fragments beyond a plane. The probes have no state."""
 
     def __init__(self, case: Case, scene: Scene) -> None:
         self._scene = scene

@@ -14,7 +14,7 @@ from ..rigid.stage import Rigid
 
 
 class Scene(NamedTuple):
-    """The objects of a simulation on this rank that gauges read."""
+    """Objects of a simulation on this rank that gauges read."""
 
     model: Model
     contact: Contact | None
@@ -33,7 +33,9 @@ class Gauge(Protocol):
     """
 
     def measure(self, v: Floats) -> dict[int, float]:
-        """Return the present values, keyed by the number of the probe. ``v`` (nodes, 3): present velocities, m/s."""
+        """Return the present values; the keys are the numbers of the probes. ``v`` (nodes, 3): present velocities,
+        m/s.
+        """
 
     def keep(self) -> Any:
         """Return the state of the gauges for a checkpoint: lists of numbers and arrays, equal on all ranks."""

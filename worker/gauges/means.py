@@ -17,7 +17,7 @@ from .gauge import Scene
 
 
 class Means:
-    """The probes on this rank that are means; the probes have no state."""
+    """Probes on this rank that are means. The probes have no state."""
 
     def __init__(self, case: Case, scene: Scene, numbers: Sequence[int]) -> None:
         """``numbers``: indices of the probes in the case."""

@@ -15,7 +15,7 @@ from .gauge import Scene
 
 
 class Peaks:
-    """The probes on this rank that are largest or smallest values; the probes have no state."""
+    """Probes on this rank that are largest or smallest values. The probes have no state."""
 
     def __init__(self, case: Case, scene: Scene, numbers: Sequence[int]) -> None:
         """``numbers``: indices of the probes in the case."""
@@ -24,8 +24,8 @@ class Peaks:
         self.tets = ChosenTets(case, scene.model, numbers)
 
     def measure(self, v: Floats) -> dict[int, float]:
-        """Return the values; NaN if all tets of a probe were removed. A smallest value is computed as the maximum of
-        the negative field, so that one message has all values.
+        """Return the values of the probes; NaN if all tets of a probe were removed. A smallest value is computed as the
+        maximum of the negative field, so that one message contains all values.
         """
         self.tets.changed()
         most = self._comm.maximum(np.array([self._own(k, name) for k, name in self._fields.items()])).tolist()

@@ -1,9 +1,9 @@
 """Depth of the hole that a part has made in the other parts, measured on straight lines parallel to the axis.
 
-A line is cut into spans inside of tets and voids between the tets; the hole is the void in front of the bodies and all
-voids joined to this void; voids of neighbouring lines are joined where they overlap. A cavity that opens ahead of the
-hole is not joined to the hole, and a flake in the hole does not end the hole. The free space beyond the bodies is not a
-void.
+A line is cut into spans inside of tets and voids between the tets. Voids of neighbouring lines are joined if they
+overlap. The hole consists of the void in front of the bodies and all voids joined to this void. A cavity that opens
+ahead of the hole is not joined to the hole, and a flake in the hole does not end the hole. The free space beyond the
+bodies is not a void.
 """
 
 from itertools import pairwise
@@ -14,21 +14,21 @@ from ..model.state import Floats, Ints, Model, Tets
 from ..parallel.comm import Comm
 
 LINES = np.arange(1, 11) / 10.0
-"""Distances of the measuring lines from the axis, divided by the radius of the part; voids of neighbouring lines are
+"""Distances of the measuring lines from the axis, divided by the radius of the part. Voids of neighbouring lines are
 joined."""
 MEASURED = (0, 2, 4)
 """Indices in ``LINES`` of the lines whose depths are averaged; these are the lines at 0.1, 0.3 and 0.5 of the
 radius."""
 _TOUCHING = 1e-6
-"""Largest gap that counts as closed, divided by the radius. The function ``spans`` moves lines to the side by this
-distance."""
+"""Largest gap between two tets that counts as closed, divided by the radius of the part. The function ``spans`` moves
+lines to the side by the largest closed gap."""
 
 
 def spans(x: Floats, tets: Tets, axis: int, at: tuple[float, float]) -> tuple[Ints, Floats]:
     """Return the tets (k,) through which a line along ``axis`` passes, and (k, 2) the interval of the line inside of
     each tet, m.
 
-    ``at``: position of the line in the two directions normal to ``axis``. The line is moved aside by some 1e-6 of its
+    ``at``: position of the line in the two directions normal to ``axis``. The line is moved aside by about 1e-6 of its
     distance from the axis, because a line that lies in a face would be in two tets.
     """
     i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -94,17 +94,15 @@ def _maximum(comm: Comm, values: Floats) -> float:
 
 
 def thickness(rows: Floats, parts: int) -> Floats:
-    """Return (measured lines, parts) the length of each line inside of each part, m; ``rows``: the result of
-    ``passed``.
-    """
+    """Return (measured lines, parts) the length of each line inside of each part, m. ``rows``: result of ``passed``."""
     total = np.zeros((len(LINES), parts))
     np.add.at(total, (rows[:, 0].astype(int), rows[:, 1].astype(int)), rows[:, 3] - rows[:, 2])
     return total[list(MEASURED)]
 
 
 def depth(rows: Floats, thick: Floats, radius: float) -> float:
-    """Return the part of the thickness ``thick`` (measured lines, parts), m, that lies in front of the end of the hole,
-    m.
+    """Return (measured lines, parts) a part of the thickness ``thick``, m: the part that lies in front of the end of
+    the hole.
 
     The hole starts at the low end of the axis. The remaining thickness of each part is the distance from the end of the
     hole to the rear of the part; it includes cavities. The rear is the furthest point of the part on any line, because
@@ -117,7 +115,7 @@ def depth(rows: Floats, thick: Floats, radius: float) -> float:
 
 
 def bottoms(rows: Floats, tolerance: float) -> Floats:
-    """Return (lines,) the end of the hole on each line, m; infinite if the line is open to the rear."""
+    """Return (lines,) the position of the end of the hole on each line, m; infinite if the line is open to the rear."""
     voids = [_voids(rows[rows[:, 0] == line, 2:], tolerance) for line in range(len(LINES))]
     reached = [np.arange(len(some)) == 0 for some in voids]
     while True:
@@ -143,6 +141,6 @@ def _voids(spans: Floats, tolerance: float) -> Floats:
 
 
 def _overlap(one: Floats, two: Floats, tolerance: float) -> "np.ndarray":
-    """Return (v, w) whether each of v voids of one line overlaps each of w voids of another line."""
+    """Return (v, w) flags: True if a void of one line (v voids) overlaps a void of another line (w voids)."""
     low, high = np.maximum(one[:, None, 0], two[:, 0]), np.minimum(one[:, None, 1], two[:, 1])
     return np.asarray(high > low + tolerance)

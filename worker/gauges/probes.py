@@ -1,4 +1,4 @@
-"""Probes, which are the columns of history.csv; the probes are grouped by the way in which they are measured."""
+"""Probes, which are the columns of history.csv. Probes that are measured in the same way form a group."""
 
 import logging
 from collections.abc import Callable
@@ -25,11 +25,11 @@ log = logging.getLogger("conoid.worker")
 _OTHER: tuple[tuple[tuple[str, ...], Callable[[Case, Scene], Gauge]], ...] = (
     (PUSHES, Pushes), (COURSES, Courses), (SUMS, NodeSums), (FRAGMENTS, Flying), (SHAPES, Shapes),
 )  # fmt: skip
-"""Fields that are not measured over tets, each with the class that measures it."""
+"""Fields that are not measured over tets, and the class that measures each of them."""
 
 
 class Probes:
-    """The probes of a case on this rank."""
+    """Probes of a case on this rank."""
 
     def __init__(self, case: Case, scene: Scene) -> None:
         self.names = [probe.name for probe in case.probes]
@@ -44,7 +44,7 @@ class Probes:
         self._gauges: list[Gauge] = [*over_tets, *(make(case, scene) for names, make in _OTHER if {*kinds} & {*names})]
         self._sums = NodeSums(case, scene)
         self.sums = any(isinstance(gauge, NodeSums) for gauge in self._gauges)
-        """Whether some probe is a sum over nodes; such a probe needs the velocities at time n."""
+        """True if a probe is a sum over nodes. A probe that is a sum over nodes needs the velocities at time n."""
 
     def require_tets(self, case: Case) -> None:
         """Raise InputError on every rank if a probe over tets has no tet, or if a sum over a box or a set has no
@@ -84,8 +84,8 @@ class Probes:
     def measure(self, v: Floats | None = None) -> Floats:
         """Return (probes,) the present values, equal for any number of ranks.
 
-        Collective. ``v`` (nodes, 3): velocities at time n, for probes that are sums. The velocities are needed if those
-        of the model are half a step ahead.
+        Collective. ``v`` (nodes, 3): velocities at time n, for probes that are sums. The argument is needed if the
+        velocities of the model are half a step ahead.
         """
         found: dict[int, float] = {}
         for gauge in self._gauges:

@@ -18,14 +18,14 @@ _AXES = "xyz"
 
 
 class Pushes:
-    """The probes of forces and impulses on this rank."""
+    """Probes of forces and impulses on this rank."""
 
     def __init__(self, case: Case, scene: Scene) -> None:
         self._scene = scene
         self._probes = {k: probe for k, probe in enumerate(case.probes) if kind(probe.field) in PUSHES}
         self._names = [wall.name for _, wall in case.boundaries_of(Wall)]
         self._given, self._since = np.zeros(len(self._probes)), 0.0
-        """(probes,) impulses at the last sample, N s; and the time of the last sample, s."""
+        """(probes,) impulses at the last sample, N s; and simulated time of the last sample, s."""
 
     def measure(self, v: Floats) -> dict[int, float]:
         now, t = self._impulses(), self._scene.clock.t
@@ -73,8 +73,8 @@ class Pushes:
         return found
 
     def _given_by(self, walls: Boundary) -> Floats:
-        """Return (n, probes) the impulses, N s, of walls on each of their nodes. Only nodes that this rank owns are
-        counted.
+        """Return (n, probes) the impulses of walls on each node of the walls, N s. Only nodes that this rank owns are
+        included.
         """
         nodes, columns = self._scene.model.nodes, np.zeros((len(walls.nodes), len(self._probes)))
         for place, probe in enumerate(self._probes.values()):

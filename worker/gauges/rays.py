@@ -9,7 +9,7 @@ from ..mesh.faces import FACES
 from ..model.state import Floats, Tets
 
 RAYS = 360
-"""Number of rays; chosen value: a hole with a hundred tets on its circumference has three or four rays for each tet."""
+"""Number of rays. Chosen value: a hole with a hundred tets on its circumference has three or four rays for each tet."""
 
 
 def directions(axis: int) -> Floats:
@@ -27,7 +27,7 @@ def reach(x: Floats, tets: Tets, origin: Floats, axis: int) -> Floats:
     """Return (RAYS,) the distance, m, from ``origin`` (3,) to the nearest material along each ray normal to an axis;
     infinite if the ray meets no material.
 
-    A point of a ray is inside of a tet if it is on the inner side of the planes of all faces of the tet (Cyrus and
+    A point of a ray is inside of a tet if it is on the inner side of the planes of all faces (algorithm of Cyrus and
     Beck).
     """
     along = x[tets][:, :, axis]

@@ -19,11 +19,11 @@ from .gauge import Scene
 
 _AXES = "xyz"
 _DAMAGED = 0.5
-"""Damage of a tet above which the tet counts as broken; chosen value: damage increases from 0 to 1 within few steps."""
+"""Damage above which a tet counts as broken. Chosen value: damage increases from 0 to 1 within few steps."""
 
 
 class Shapes:
-    """The probes of shapes on this rank.
+    """Probes of shapes on this rank.
 
     At the start each probe measures the initial state: thicknesses, distances along rays, areas of faces.
     """
@@ -101,7 +101,7 @@ class Shapes:
     def _areas(self, probe: Probe, axis: int, ends: tuple[float, float], sound: Any) -> list[float]:
         """Return the initial areas, m^2, of the faces of tets at the two ends of the part.
 
-        ``sound``: for each block of the part, (n,) whether each tet counts; None if all tets count.
+        ``sound``: for each block of the part, (n,) True for each tet that is included; None if all tets are included.
         """
         x, near, columns = self._scene.model.nodes.x0, self._scene.model.slack, []
         for b, block in enumerate(self._blocks(probe)):
@@ -114,8 +114,8 @@ class Shapes:
         return [float(v) for v in exact_sums(self._scene.comm, np.concatenate([np.zeros((0, 2)), *columns]))]
 
     def _sound(self, probe: Probe) -> Any:
-        """Return, for each block of the part, (n,) whether each tet is undamaged and belongs to the heaviest fragment
-        of the part.
+        """Return, for each block of the part, (n,) True for each tet that is undamaged and belongs to the heaviest
+        fragment of the part.
         """
         scene, model = self._scene, self._scene.model
         cohesion = scene.fracture.cohesion if scene.fracture is not None else None

@@ -31,7 +31,7 @@ def way(beyond: Beyond) -> float:
 
 
 class NodeSums:
-    """The probes on this rank that are sums over nodes; the probes have no state."""
+    """Probes on this rank that are sums over nodes. The probes have no state."""
 
     def __init__(self, case: Case, scene: Scene) -> None:
         self._scene, self._bits = scene, bits(case)
@@ -63,8 +63,8 @@ class NodeSums:
         pass
 
     def started(self, probe: Probe) -> Flags:
-        """Return (nodes,) whether each node is owned by this rank, was in the box of a probe at the start, and is in
-        the set of the probe.
+        """Return (nodes,) True for each node that this rank owns, that was in the box of a probe at the start, and that
+        is in the set of the probe.
         """
         model, nodes = self._scene.model, self._scene.model.nodes
         part = model.parts.index(probe.part)
@@ -79,15 +79,15 @@ class NodeSums:
         return found if erosion is None else np.asarray(found & ~erosion.removed)
 
     def chosen(self, probe: Probe) -> Flags:
-        """Return (nodes,) whether each node belongs to the probe and is owned by this rank."""
+        """Return (nodes,) True for each node that belongs to the probe and is owned by this rank."""
         found = self.present(probe)
         if probe.beyond is not None:
             found &= ahead(probe.beyond, self._scene.model.nodes.x) > 0.0
         return found
 
     def _of_bodies(self, v: Floats) -> dict[int, float]:
-        """Return the values of probes of whole rigid parts; these probes are not sums over nodes, because inertia and
-        centre of a rigid part may differ from the sums over its nodes.
+        """Return the values of probes of whole rigid parts. Probes of rigid parts are not sums over nodes, because
+        inertia and centre of a rigid part may differ from the sums over its nodes.
         """
         found: dict[int, float] = {}
         rigid, clock = self._scene.rigid, self._scene.clock
@@ -102,7 +102,7 @@ class NodeSums:
         return found
 
     def _columns(self, probe: Probe, v: Floats) -> tuple[Floats, Floats]:
-        """Return two columns (nodes,): the terms of the sum, and the terms of its divisor."""
+        """Return two columns (nodes,): the terms of the sum of a probe, and the terms of its divisor."""
         nodes, field = self._scene.model.nodes, kind(probe.field)
         mass = np.where(self.chosen(probe), nodes.mass_of(self._scene.model.parts.index(probe.part)), 0.0)
         if field in ("mass", "residual_mass"):

@@ -1,4 +1,6 @@
-"""Parts of a finished run with strains so small that the parts could have been rigid (cases/warnings/unstrained.py)."""
+"""Warnings about parts of a finished run that could have been rigid, because their strains are very small
+(cases/warnings/unstrained.py).
+"""
 
 from collections.abc import Iterator
 from pathlib import Path

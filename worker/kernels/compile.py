@@ -28,19 +28,20 @@ Tell = Callable[[int, int], None]
 """Callback that receives the progress every few seconds: number of compiled kernels, and number of all kernels."""
 
 COMPLETE = "complete"
-"""File in the cache folder; if it exists, all kernels are compiled."""
+"""File in the cache folder. If the file exists, all kernels are compiled."""
 WORD_EVERY = 3.0
 """Interval between two reports of the progress, s. Chosen value."""
 _MOST = 4
-"""Largest number of child processes; chosen value: the longest chain of imports has 27 % of the machine code."""
+"""Largest number of child processes. Chosen value: the longest chain of imports has 27 % of the machine code."""
 _MOST_WORDS = 500
-"""Number of characters that are kept of an error report of numba. The error is at the beginning of the report."""
+"""Number of characters that are kept from an error report of numba. The error is at the beginning of the report."""
 _PATIENCE = 900.0
 """Time limit for the compilation of a module, s. The largest module takes ten seconds on an idle core."""
 _HASH = "hash"
-"""File in the folder of a module with compiled kernels. The file has the hash of the sources of the kernels."""
+"""File in the folder of a module with compiled kernels. The file contains the hash of the sources of the kernels."""
 _LOCK, _LOOK = "lock", 0.3
-"""Lock file of the program that compiles; and interval between two checks of the lock, s, a tenth of WORD_EVERY."""
+"""Two constants: the lock file of the program that compiles; and the interval between two checks of the lock, s, which
+is a tenth of WORD_EVERY."""
 
 
 def compile_all(folder: Path, tell: Tell, root: Path = store.ROOT, package: str = "conoid.worker") -> bool:
@@ -114,7 +115,7 @@ class _Module:
 
     def take_over(self, folder: Path) -> bool:
         """Links the kernels of the module from another folder beside ``folder``, unless ``folder`` has them. Returns
-        whether all kernels of the module are now in the folder.
+        True if all kernels of the module are now in the folder.
         """
         own = folder / self.name
         if self._whole(own):
@@ -137,7 +138,7 @@ class _Module:
             return False
 
     def _link(self, other: Path, own: Path) -> bool:
-        """Links files. Returns False if the file system allows no links; the kernels are then compiled."""
+        """Links files. Returns False if the file system allows no links; in this case the kernels are compiled."""
         try:
             own.mkdir(exist_ok=True)
             for path in other.glob("*.nb[ci]"):
@@ -165,12 +166,14 @@ def _order(files: set[Path]) -> dict[Path, set[Path]]:
 
 
 def _needed(path: Path, files: set[Path]) -> set[Path]:
-    """Returns the ``files`` that ``path`` imports, at any depth."""
+    """Returns the ``files`` that ``path`` imports, directly or through other files."""
     return (store.reached([path]) & files) - {path}
 
 
 def _in_parallel(needs: dict[Path, set[Path]], folder: Path, progress: _Saying, modules: dict[Path, _Module]) -> None:
-    """Compiles files, each after the files that it ``needs``, with as many child processes as there are cores."""
+    """Compiles files. A file is compiled after the files that it ``needs``. The function uses as many child processes
+    as there are cores.
+    """
     children: queue.SimpleQueue[_Child] = queue.SimpleQueue()
     number = min(_MOST, len(os.sched_getaffinity(0)), len(needs))
     done: set[Path] = set()
@@ -207,13 +210,13 @@ def _by_one(children: "queue.SimpleQueue[_Child]", module: str) -> None:
 
 @dataclass(frozen=True)
 class _Child:
-    """A process that compiles modules; its standard error is the file ``errors``."""
+    """Process that compiles modules. Its standard error is the file ``errors``."""
 
     process: "subprocess.Popen[bytes]"
     errors: IO[bytes]
 
     def compile(self, module: str) -> None:
-        """Compiles a module. Returns when all kernels of the module are in the cache. Raises CompileError, or
+        """Compiles a module. Returns when all kernels of the module are in the cache. Raises CompileError. Raises
         StoppedError if the run was asked to stop, because a launcher sends the stop signal to all processes of a rank.
         """
         assert self.process.stdin is not None

@@ -1,11 +1,11 @@
 """Kernels: functions that numba compiles for their declared signature, at their first call.
 
 ``numba.njit`` compiles a function with a signature at its declaration, or loads it from the cache. With ``numba.njit``
-every rank would load every kernel of the worker at its start, for any scene. ``njit`` of this module compiles or loads
-a kernel at its first call, from Python or from another kernel; no other module imports numba.
+every rank would load every kernel of the worker at its start, for any scene. The decorator ``njit`` of this module
+compiles or loads a kernel at its first call, from Python or from another kernel. No other module imports numba.
 
-numba counts references to every array of every record that one kernel passes to another, with atomic operations; a
-kernel that makes no array needs no reference counts and is compiled without them. In the narrow phase of a stack of
+numba counts references to every array of every record that one kernel passes to another, with atomic operations. A
+kernel that makes no array needs no reference counts, and is compiled without them. In the narrow phase of a stack of
 plates, reference counts took three quarters of the time.
 """
 
@@ -32,18 +32,17 @@ __all__ = ["DECLARED", "Kernel", "intrinsic", "njit", "packed", "prefetch", "rec
 
 _BLAS = "scipy.linalg"
 _TO_READ, _TO_SECOND, _DATA = 0, 2, 1
-"""Arguments of LLVM's prefetch instruction: the access is reading, the target is the second-level cache, the content is
-data."""
+"""Arguments of LLVM's prefetch instruction: reading, second-level cache, data."""
 FunctionIdentity._unique_ids = iter(lambda: int.from_bytes(os.urandom(8), "big"), None)  # type: ignore[assignment]
 """Random numbers by which numba distinguishes functions with equal names. By default numba counts the functions of each
-process. Two kernels from different processes may then have functions with equal name and number, and the function that
-is loaded first is used by the two kernels. A kernel could call the wrong function, and crash (numba issue 10486)."""
+process. Two kernels from different processes may then have functions with equal name and number. Two such kernels both
+use the function that is loaded first, so a kernel may call the wrong function and crash (numba issue 10486)."""
 _MAKERS = {
     "arange", "argsort", "array", "concatenate", "copy", "cumsum", "empty", "full", "ones", "sort", "unique", "zeros",
 }  # fmt: skip
-"""Names of functions and methods that make arrays. A kernel that calls one of them needs reference counts. numba
-refuses to compile a kernel without reference counts if the kernel makes arrays in another way, or assigns whole rows;
-such a kernel is declared with ``_nrt=True``."""
+"""Names of functions and methods that make arrays. A kernel that calls such a function needs reference counts. If a
+kernel makes arrays in another way, or assigns whole rows, numba cannot compile it without reference counts. A kernel
+with such array code is declared with ``_nrt=True``."""
 DECLARED: list["Kernel"] = []
 """All kernels of the imported modules."""
 
@@ -54,8 +53,8 @@ def _folder() -> str:
 
 
 class _ModuleFolder(_CacheLocator):
-    """Locator of cache files, an interface of numba; it returns the cache folder of the module of a kernel. This folder
-    is inside of the folder that kernels/store.py names by the sources.
+    """Locator of cache files, an interface of numba, which returns the cache folder of the module of a kernel. The
+    folder of a module is inside of the folder that kernels/store.py names by a hash of the sources.
     """
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
@@ -68,21 +67,23 @@ class _ModuleFolder(_CacheLocator):
         return self._path
 
     def get_source_stamp(self) -> str:
-        """Returns a constant. numba expects a time stamp of the sources, but different sources have different
+        """Returns a constant. numba expects a time stamp of the sources here, but different sources have different
         folders.
         """
         return ""
 
     def get_disambiguator(self) -> str:
-        """Returns a part of the file name of a kernel; by default this part contains the line of the kernel; it is
-        empty here, because a changed docstring moves lines. Kernels with equal names share an index file, in which
-        numba finds a kernel by its byte code.
+        """Returns a part of the file name of a kernel. By default the file name contains the line of the kernel in the
+        source. Here it is empty, because a changed docstring moves lines. Kernels with equal names share an index file,
+        in which numba finds a kernel by its byte code.
         """
         return ""
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> "_ModuleFolder | None":
-        """Returns None if the folder is not set or cannot be made; numba then uses its default folder."""
+        """Returns None if the cache folder is not set or cannot be made. If the method returns None, numba uses its
+        default folder.
+        """
         try:
             return cls(function, file) if _folder() else None
         except OSError:
@@ -98,7 +99,7 @@ class _Cache(FunctionCache):
 
 
 class Kernel(CPUDispatcher):
-    """A compiled function with one signature."""
+    """Compiled function with one signature."""
 
     signature: Any = ""
     """Signature of the kernel as it was declared: text in numba's notation, or a signature made with ``types``."""
@@ -132,8 +133,8 @@ class Kernel(CPUDispatcher):
         return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name))
 
     def compile(self, sig: Any) -> Any:
-        """Returns the entry point of this kernel, when numba compiles a call of the kernel in another kernel; for any
-        ``sig`` it is the entry point of the declared signature.
+        """Returns the entry point of this kernel. numba calls this method when it compiles a call of the kernel in
+        another kernel. For any ``sig`` the result is the entry point of the declared signature.
         """
         self.load()
         (compiled,) = self.overloads.values()
@@ -148,7 +149,7 @@ class Kernel(CPUDispatcher):
 
 
 def _makes_arrays(kernel: Kernel) -> bool:
-    """Returns whether a kernel needs reference counts, because it makes arrays or calls a kernel that returns
+    """Returns True if a kernel needs reference counts, because it makes arrays or calls a kernel that returns
     arrays.
     """
     names, used = kernel.py_func.__code__.co_names, inspect.getclosurevars(kernel.py_func)
@@ -191,7 +192,7 @@ def record(name: type, *kinds: Any) -> Any:
 
 
 packed: Any = cgutils.pack_array
-"""Makes an LLVM array of a list of values, for intrinsics."""
+"""Makes an LLVM array from a list of values, for intrinsics."""
 
 
 def _prefetch(_: Any, array: Any, index: Any) -> Any:
@@ -209,14 +210,12 @@ def _prefetch(_: Any, array: Any, index: Any) -> Any:
 
 
 prefetch: Any = intrinsic(_prefetch)
-"""Loads the cache line of an element of a one-dimensional array; to be called in a kernel. The call changes no value.
-An index beyond the end of the array does no harm."""
+"""Loads the cache line of an element of a one-dimensional array. The function must be called in a kernel. The call
+changes no value, and an index beyond the end of the array causes no error."""
 
 
 class _Loading:
-    """CPU time and wall time that this thread has spent on loading kernels, s. The time of nested loads is counted
-    once.
-    """
+    """CPU time and wall time that this thread has used to load kernels, s. The time of nested loads is counted once."""
 
     def __init__(self) -> None:
         self.spent = self.passed = 0.0

@@ -1,8 +1,8 @@
 """Loading of the kernels that a scene needs, on all ranks at once before the first step.
 
 A kernel is loaded at its first call (worker/kernels/jit.py), which takes 3 to 20 ms. Without this module each rank
-would load the forty kernels of fracture when cracks reach the rank, and all other ranks would wait. The kernels are
-found by the names that occur in the functions of the packages.
+would load the forty kernels of fracture when cracks reach the rank, and all other ranks would wait for this rank. The
+kernels are found by the names in the functions of the packages.
 """
 
 import sys
@@ -52,8 +52,8 @@ def called(module: ModuleType) -> Iterator[Kernel]:
 
 
 def _functions(code: CodeType, kernels: set[CodeType]) -> Iterator[CodeType]:
-    """Yields the functions that are defined in a code object, at any depth; functions among ``kernels`` are left
-    out.
+    """Yields the functions that are defined in a code object, also those inside of other functions. Functions among
+    ``kernels`` are left out.
     """
     for constant in code.co_consts:
         if isinstance(constant, CodeType) and constant not in kernels:

@@ -2,11 +2,11 @@
 
 numba's disk cache does not detect an edited callee in another file. Therefore the name of the cache folder is a hash.
 The hash covers the code of every source on which kernels depend (files with kernels, and their imports from the
-worker), the versions and the processor. The hash does not depend on path and time of a source, so equal sources share a
-folder. Inside of the cache folder each module has its own folder (worker/kernels/jit.py), named by a hash of the
-sources of its kernels. A new cache folder gets the folders of unchanged modules from an earlier cache folder. Rank 0
-hashes the sources once in a run, compiles missing kernels (worker/kernels/compile.py), and sends the hash to the other
-ranks.
+worker), the versions and the processor. The hash does not depend on the path and the time stamp of a source. Therefore
+equal sources share a folder. Inside of the cache folder each module has its own folder (worker/kernels/jit.py), named
+by a hash of the sources of its kernels. A new cache folder gets the folders of unchanged modules from an earlier cache
+folder. Rank 0 hashes the sources once in a run, compiles missing kernels (worker/kernels/compile.py), and sends the
+hash to the other ranks.
 """
 
 import hashlib
@@ -31,7 +31,7 @@ Reading the syntax trees of all sources would take six times as long."""
 
 @cache
 def source_hash(root: Path = ROOT) -> str:
-    """Returns a hash of the sources of all kernels below ``root`` and of the versions. The computation takes 0.06 s of
+    """Returns a hash of the sources of all kernels below ``root``, and of the versions. The computation takes 0.06 s of
     CPU time on an idle core.
     """
     return _hashed(kernel_sources(root), root)
@@ -75,12 +75,14 @@ def cache_folder(sources: str | None = None) -> Path:
 
 
 def kernel_sources(root: Path) -> set[Path]:
-    """Returns the files below ``root`` that have kernels, and the files from which they import names, at any depth."""
+    """Returns two kinds of files: files below ``root`` that have kernels, and files from which these import names,
+    directly or through other files.
+    """
     return reached(kernel_files(root))
 
 
 def reached(paths: list[Path]) -> set[Path]:
-    """Returns the files ``paths``, and the files that they import relatively, at any depth."""
+    """Returns the files ``paths``, and the files that they import relatively, directly or through other files."""
     found: set[Path] = set()
     waiting = list(paths)
     while waiting:

@@ -1,7 +1,7 @@
 """J2 plasticity with linear hardening and the rate factor of Cowper and Symonds. The stress is returned radially to the
 yield surface.
 
-sigma = (Y + H e) (1 + (rate / D)^(1/q)); cowper and Symonds 1957. Derived in docs/theory/materials.md.
+sigma = (Y + H e) (1 + (rate / D)^(1/q)); Source: Cowper and Symonds 1957. Derived in docs/theory/materials.md.
 
 The yielding tets of a chunk are copied side by side into the scratch memory and solved together, as in johnson_cook.py.
 """
@@ -33,7 +33,7 @@ _LARGE = 1e300
 
 @njit("int64(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _gather(w, s, n):  # type: ignore[no-untyped-def]
-    """Copies the tets above their static flow stress side by side into the scratch memory; returns their number."""
+    """Copies the tets above their static flow stress side by side into the scratch memory. Returns their number."""
     m = 0
     for i in range(n):
         w[FACTOR + i] = 1.0
@@ -64,7 +64,7 @@ def _newton(w, params, m, fast):  # type: ignore[no-untyped-def]
 @njit("int64(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def increments(w, params, m, fast):  # type: ignore[no-untyped-def]
     """Replaces row ROOT by the plastic strain increments d = fast u^q of the ``m`` tets in the scratch; returns the
-    number of iterations. ``fast`` is dt D; u is the root of
+    number of iterations. ``fast`` is dt D, with the time step dt and the constant D of the law; u is the root of
 
         OVER = 3 G d + STATIC u + H d (1 + u)
 
@@ -88,8 +88,8 @@ def increments(w, params, m, fast):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def cowper_symonds(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial stress of the tets above their static flow stress to the flow stress at the strain rate of the
-    step.
+    """Returns the trial stress radially to the flow stress at the strain rate of the step, for tets above their static
+    flow stress.
     """
     equivalent_stress(w, s, n)
     m = _gather(w, s, n)
@@ -113,4 +113,4 @@ LAW = Law(
     "cowper_symonds", BEFORE_PRESSURE, lambda _: YIELD + 1, lambda law: (law.hardening, law.D, law.q), _begin,
     cowper_symonds,
 )  # fmt: skip
-"""J2 strength law with linear hardening and a power of the strain rate. The static flow stress is a state row."""
+"""J2 strength law with linear hardening and a power law of the strain rate. The static flow stress is a state row."""

@@ -1,4 +1,4 @@
-"""Hypoelastic deviatoric stress with an exact rotation. For a material with a strength law the elastic stress is the
+"""Hypoelastic deviatoric stress with an exact rotation. If a material has a strength law, the elastic stress is the
 trial stress.
 """
 
@@ -66,8 +66,8 @@ def predict(w, s, n, shear, dt):  # type: ignore[no-untyped-def]
 
     s becomes Q s Q^T with Q = (I - W dt/2)^-1 (I + W dt/2), a rotation to round-off (Hughes and Winget 1980); in closed
     form, where a is the axial vector of W dt/2, Q = I + 2 (A + A^2) / (1 + a.a). The work of a step is V s : D,
-    integrated by the trapezoidal rule. This function adds the half with the rotated old stress; ``deviatoric_work``
-    adds the half with the new stress.
+    integrated by the trapezoidal rule. The function ``predict`` adds the half of the work with the rotated old stress;
+    ``deviatoric_work`` adds the half with the new stress.
     """
     turn_rate(w, n)
     twice_shear_dt = 2.0 * shear * dt
@@ -117,7 +117,7 @@ def predict(w, s, n, shear, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def deviatoric_work(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Adds V dt/2 s : D, which is the half of the step's work with the new stress."""
+    """Adds V dt/2 s : D, the second half of the work of the step, computed with the new stress."""
     for i in range(n):
         mean = w[DILATATION + i] * _THIRD
         power = (

@@ -11,12 +11,12 @@ from ..kernels.jit import njit
 from ..model.state import CHUNK
 
 _LN2_HIGH, _LN2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
-"""The number ln 2 as a sum of two float64; the first has 33 bits, so that its product with an exponent is exact;
-together they have 86 bits."""
+"""The number ln 2 as a sum of two float64, which together have 86 bits. The first of the two has 33 bits, so that its
+product with an exponent is exact."""
 _INVERSE_LN2 = 1.4426950408889634
 """The number 1 / ln 2."""
 NEAREST = 6755399441055744.0
-"""1.5 times 2^52; if this constant is added to a smaller number, the last bits of the sum contain the nearest
+"""The number 1.5 * 2^52. If this number is added to a smaller number, the last bits of the sum contain the nearest
 integer."""
 _ROOT_HALF = 0x3FE6A09E667F3BCD
 """Bit pattern of sqrt(1/2). An argument is divided by a power of two such that the result is between sqrt(1/2) and
@@ -51,7 +51,9 @@ def log(x):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 2)(float64)", cache=True, error_model="numpy", forceinline=True)
 def _reduced(x):  # type: ignore[no-untyped-def]
-    """Returns k, as the last bits of a float64, and e^r - 1, computed with 12 terms, where r = x - k ln 2."""
+    """Returns k, as the last bits of a float64, and e^r - 1. Here r = x - k ln 2, and e^r - 1 is computed with 12
+    terms.
+    """
     shifted = x * _INVERSE_LN2 + NEAREST
     k = shifted - NEAREST
     r = (x - k * _LN2_HIGH) - k * _LN2_LOW
@@ -78,8 +80,8 @@ def exp(x):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64)", cache=True, error_model="numpy")
 def exp_less_one(x):  # type: ignore[no-untyped-def]
-    """Returns e^x - 1 for x up to MOST, computed as 2^k (e^r - 1) + (2^k - 1); relative error 4e-16. The result is -1
-    for x below LEAST.
+    """Returns e^x - 1 for x up to MOST, computed as 2^k (e^r - 1) + (2^k - 1), or -1 for x below LEAST; relative error
+    4e-16.
     """
     if x < LEAST:
         return -1.0
@@ -90,8 +92,8 @@ def exp_less_one(x):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64)", cache=True, error_model="numpy")
 def power(x, exponent):  # type: ignore[no-untyped-def]
-    """Returns x to the power ``exponent``, for a positive exponent. x must be zero or a positive normal number; the
-    result is limited to the range from e^LEAST to e^MOST, or is 0 for x = 0.
+    """Returns x to the power ``exponent``, for a positive exponent. x must be zero or a positive normal number. The
+    result is 0 for x = 0, and is limited to the range from e^LEAST to e^MOST for other x.
     """
     return exp(max(min(exponent * log(x), MOST), LEAST)) if x > 0.0 else 0.0
 

@@ -1,4 +1,4 @@
-"""Equations of state; they compute the pressure from the volume strain, and the tangent modulus for the wave speed.
+"""Equations of state, which compute the pressure from the volume strain, and the tangent modulus for the wave speed.
 
 The scratch row SEEN has the volume strain of the step, which is that of the tet or a mean over its nodes. The scratch
 row CHANGE has the change of the volume of the tet, so that the computed work is equal to the work of the nodal forces.
@@ -32,11 +32,11 @@ _P, _MASS, _WORK, _RATIO = PRESSURE * CHUNK, MASS * CHUNK, WORK * CHUNK, VOLUME_
 _WORK_VISCOUS, _WORK_PLASTIC, _PORES = WORK_VISCOUS * CHUNK, WORK_PLASTIC * CHUNK, PORES * CHUNK
 _HEAT, _GROWN = HEAT * CHUNK, DILATION * CHUNK
 _OLD, _KNOWN, _FACTOR = NODAL, NODAL + CHUNK, NODAL + 2 * CHUNK
-"""Scratch rows: pressure before the step, Pa; and coefficients of the energy equation factor * (new pressure) = cold
-part + known."""
+"""Scratch rows: pressure before the step, Pa; and the coefficients factor and known of the energy equation factor *
+(new pressure) = cold part + known."""
 _LEAST = 0.05
-"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest; chosen value; this limit can only
-decrease the stable step."""
+"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest. Chosen value: a limit of the bulk
+modulus from below can only decrease the stable step."""
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
@@ -55,9 +55,9 @@ def linear(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64, float64)", cache=True, error_model="numpy")
 def _book_pores(w, s, params, i, strain, mean):  # type: ignore[no-untyped-def]
-    """Adds the plastic work of pores that have grown by the volume strain ``strain``; as for the total work, it is the
-    ``mean`` pressure of the step times ``strain``. Corrects the elastic energy, because after the growth its density
-    belongs to another volume.
+    """Adds the plastic work of pores that have grown by the volume strain ``strain``. In the same way as for the total
+    work, it is the ``mean`` pressure of the step times ``strain``. Corrects the elastic energy, because its density
+    belongs to another volume after the growth.
     """
     stored = squeezed(s, params, i)
     if params[ORDER] != FROM_SHAPE:
@@ -67,9 +67,9 @@ def _book_pores(w, s, params, i, strain, mean):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Limits the pressure to p >= -spall, and to p <= 0 while the tet has pores, by moving volume strain between solid
-    and pores. If the averaged pressure forms have subtracted a dilation (row DILATION below zero), the pressure before
-    the step contains this dilation.
+    """Limits the pressure p by moving volume strain between solid and pores: p >= -spall always, and p <= 0 while the
+    tet has pores. If the averaged pressure forms have subtracted a dilation (row DILATION below zero), the pressure
+    before the step contains this dilation.
     """
     bulk, spall, dilates = params[BULK], params[SPALL], params[DILATES] > 0.0
     for i in range(n):
@@ -86,7 +86,7 @@ def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def volumes_by_ratio(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_SEEN at step n, m^3, for tets that store the volume ratio of their solid."""
+    """Sets the row VOLUME_SEEN to its value at step n, m^3, for tets that store the volume ratio of their solid."""
     per_density, porous = 1.0 / params[DENSITY], params[SPALL] < np.inf
     for i in range(n):
         whole = 1.0 + s[_PORES + i] if porous else 1.0
@@ -95,7 +95,7 @@ def volumes_by_ratio(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def volumes_by_pressure(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_SEEN at step n, m^3, for the linear pressure: V0 exp(pores - p / K)."""
+    """Sets the row VOLUME_SEEN to its value at step n, m^3, for the linear pressure: V0 exp(pores - p / K)."""
     per_density, per_bulk, porous = 1.0 / params[DENSITY], 1.0 / params[BULK], params[SPALL] < np.inf
     for i in range(n):
         pores = s[_PORES + i] if porous else 0.0
@@ -123,8 +123,8 @@ def cold(params, ratio):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64, float64, float64)", cache=True, error_model="numpy", forceinline=True)
 def modulus(params, ratio, tangent, pressure):  # type: ignore[no-untyped-def]
-    """Returns rho c^2, Pa, computed with a bulk modulus of at least _LEAST times the bulk modulus at rest, because
-    strong tension makes the tangent negative; a NaN does not change.
+    """Returns rho c^2, Pa, with the wave speed c. The bulk modulus in this formula is at least _LEAST times the bulk
+    modulus at rest, because strong tension makes the tangent negative. A NaN remains NaN.
     """
     bulk, least = ratio * (tangent + params[_GAMMA] * pressure), _LEAST * params[BULK]
     return (least if bulk < least else bulk) + 4.0 / 3.0 * params[SHEAR]
@@ -168,8 +168,8 @@ def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _tear(w, s, params, n):  # type: ignore[no-untyped-def]
     """Limits the pressure of Mie-Grueneisen in the same way as ``_tear_linear``. At the cut-off, and at zero pressure
-    while pores close, the cold pressure is linear in the volume ratio of the solid, and the ratio is computed from the
-    pressure. After the pores have closed, the pressure is computed from the ratio.
+    while pores close, the cold pressure is linear in the volume ratio of the solid; in these two states the ratio is
+    computed from the pressure. After the pores have closed, the pressure is computed from the ratio.
     """
     spall, stiffness = params[SPALL], params[BULK]
     for i in range(n):
@@ -195,13 +195,13 @@ def _gruneisen(eos: MieGruneisen) -> tuple[float, ...]:
 
 
 def pole(params: Floats) -> float:
-    """Returns the compression 1 - V/V0 at which p_H is infinite, which is 1 / S; at most 1, where the volume is
-    zero.
+    """Returns the compression 1 - V/V0 at which p_H is infinite, which is 1 / S. The result is at most 1, where the
+    volume is zero.
     """
     return 1.0 / max(float(params[_SLOPE]), 1.0)
 
 
 ELASTIC = Equation("", 0, lambda _: (), linear, volumes_by_pressure)
-"""Linear pressure with the bulk modulus of the elastic constants."""
+"""Linear pressure. Its bulk modulus is that of the elastic constants."""
 GRUNEISEN = Equation("mie_gruneisen", VOLUME_RATIO + 1, _gruneisen, mie_gruneisen, volumes_by_ratio, NODAL_WORK + 1)
-"""Mie-Grueneisen equation of state, with pressure from compression and from heat."""
+"""Mie-Grueneisen equation of state. The pressure depends on compression and on heat."""

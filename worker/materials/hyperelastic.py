@@ -1,4 +1,4 @@
-"""Hyperelastic shear of materials without a strength law: the deviatoric stress has a potential, so that its energy is
+"""Hyperelastic shear of materials without a strength law. The deviatoric stress has a potential, so that its energy is
 conserved.
 
 The potential is W = V0 G/4 (tr b + tr b^-1 - 6), with b = J^(-2/3) F F^T; it is the Mooney-Rivlin form with equal
@@ -20,7 +20,7 @@ _WORK, _MASS, _DISTORTION = WORK * CHUNK, MASS * CHUNK, DISTORTION * CHUNK
 _THIRD = 1.0 / 3.0
 _ONE = 0x3FF0000000000000
 """Bit pattern of 1.0."""
-# Scratch rows of this law. The law uses the rows of rate of deformation and spin again, because it does not need them.
+# Scratch rows of this law. They are the rows of rate of deformation and spin, which this law does not need.
 _AXX, _AYY, _AZZ, _AYZ, _AZX, _AXY = (RATE + k * CHUNK for k in range(6))
 _MORE, _LESS, _HALF_SHEAR, _K = RATE + 6 * CHUNK, RATE + 7 * CHUNK, RATE + 8 * CHUNK, TRIAL
 
@@ -33,7 +33,7 @@ def inverse_sixth_root(u):  # type: ignore[no-untyped-def]
     The computation uses only + - * and the bit pattern of a float64 as an integer, with equal results in vector code
     and in scalar code; it uses no root and no quotient, because each of them takes as long as ten products. The bit
     pattern is a piecewise linear logarithm; the first y is found by shifts: a sixth of the distance from the bit
-    pattern of 1. This y is exact at 1.
+    pattern of 1. The first y is exact at u = 1.
     """
     far = np.float64(u).view(np.int64) - _ONE
     y = np.int64(_ONE - ((far >> 3) + (far >> 5) + (far >> 7) + (far >> 9) + (far >> 11))).view(np.float64)
@@ -46,8 +46,8 @@ def inverse_sixth_root(u):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def _strains(w, n):  # type: ignore[no-untyped-def]
-    """Sets rows of A = F^-T F^-1 - 1 = K^T K - K - K^T, K = du/dx = sum over nodes of u_a b_a / V, and of det(1 + A)
-    - 1.
+    """Sets rows of two quantities: A = F^-T F^-1 - 1 = K^T K - K - K^T, with K = du/dx = sum over nodes of u_a b_a / V;
+    and det(1 + A) - 1.
     """
     for i in range(n):
         b1x, b1y, b1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
@@ -77,7 +77,7 @@ def _strains(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _roots(w, n, shear):  # type: ignore[no-untyped-def]
-    """Sets the rows k = det(1 + A)^(-1/3), k - 1 without cancellation, and G / 2J; a separate loop computes these rows,
+    """Sets the rows k = det(1 + A)^(-1/3), k - 1 without cancellation, and G / 2J. A separate loop computes these rows,
     so that the long chains of operations of several tets overlap.
 
     The result is NaN if the determinant is not positive because of round-off.
@@ -133,9 +133,9 @@ def hyperelastic(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def stiffen(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Raises MODULUS from K + 4/3 G to an upper bound for a strained tet: K + 4/3 (G + 2 W / V0) / |J|.
+    """Raises the row MODULUS from K + 4/3 G to an upper bound for a strained tet: K + 4/3 (G + 2 W / V0) / |J|.
 
-    The value is positive even for an inverted tet; limits.step_limit detects an inverted tet by its volume.
+    The bound is positive even for an inverted tet; limits.step_limit detects an inverted tet by its volume.
     """
     shear = params[SHEAR]
     of_mass = shear / params[DENSITY]

@@ -1,7 +1,8 @@
 """Johnson-Cook strength law: radial return to the flow stress, with adiabatic heating.
 
-sigma = (A + B e^n) (1 + C ln max(rate / rate_0, 1)) (1 - T*^m). Johnson and Cook 1983. With ``softening`` s the flow
-stress is multiplied by 1 - s D, where D is the damage at the start of the step (Borvik and others 2001).
+sigma = (A + B e^n) (1 + C ln max(rate / rate_0, 1)) (1 - T*^m), with the plastic strain e. Source: Johnson and Cook
+1983. With ``softening`` s the flow stress is multiplied by 1 - s D, where D is the damage at the start of the step
+(Borvik and others 2001).
 
 The yielding tets of a chunk are copied side by side into the scratch memory and solved together, loop after loop, with
 the logarithms and powers of elementary.py. Converged tets are moved to the end of the list and are not changed again,
@@ -38,9 +39,9 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _STRAIN, _WORK, _YIELD, _FLOW = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK, FLOW * CHUNK
 _TEMPERATURE, _MASS, _P, _DAMAGE = TEMPERATURE * CHUNK, MASS * CHUNK, PRESSURE * CHUNK, DAMAGE * CHUNK
-# Scratch rows with one value for each yielding tet: place in the chunk; known quantities; fraction of the strength that
-# damage leaves; bracket, increment, whether the increment has not converged; flow stress without rate; e, T* and the
-# relative rate; then the logarithms and powers of e, T* and the rate.
+# Scratch rows with one value for each yielding tet. First: place in the chunk; known quantities; fraction of the
+# strength that damage leaves; bracket; increment; flag, 1 if the increment has not converged; flow stress without rate.
+# Then: e, T* and the relative rate; and the logarithms and powers of these three.
 _PLACE, _Q, _KNOWN, _HOT, _WARM, _LEFT, _LOW, _HIGH, _D, _OPEN, _STATIC, _SUM, _FAST, _SOFT, _T = (
     NODAL + k * CHUNK for k in range(15)
 )
@@ -48,25 +49,25 @@ _MOST = 140
 """Largest number of iterations. At least every second iteration halves the bracket, so the bracket reaches the last bit
 of a float64 (52 bits)."""
 _CLOSE = 1e-4
-"""Relative Newton step at which the iteration ends. The remaining error is the square of this step, below 1e-8 of
-the stress."""
+"""Relative Newton step at which the iteration ends. The remaining error of the strain increment is the square of the
+last Newton step, below 1e-8 of the stress."""
 _PATIENT = 20
 """Number of iterations after which every second iteration halves the bracket, because with softening Newton's method
 may alternate between two values. First yield, with increments between 1e-2 and 1e-21, takes up to 20 iterations without
 halving; smaller increments, for a trial stress less than 1e5 Pa above the flow stress, take up to 100 iterations with
 halving."""
 _BELOW = 1.0 - 2.0**-40
-"""Factor slightly below 1. The rate term begins at a certain increment, where the flow stress has a kink; the product
-of the factor and this increment is just below the kink."""
+"""Factor slightly below 1. The rate term begins at a certain increment, where the flow stress has a kink. The product
+of the factor and the increment at the kink is just below the kink."""
 _NARROW = 1e-12
 """Relative width of the bracket at which the iteration ends."""
 _STEEPEST = 600.0
 """Largest magnitude of the exponent of e in the fracture strain, which is then between 0 and 1e260."""
 _MOST_TENSE = 1.5
-"""Largest ratio of tension to flow stress in the formula for the fracture strain. Johnson and Cook 1985 have no
+"""Largest ratio of tension to flow stress in the formula for the fracture strain. Johnson and Cook 1985 give no
 measurements at larger ratios."""
 _LEAST_STRAIN = 1e-6
-"""Smallest fracture strain; chosen value: if the constants give a negative fracture strain, a tet breaks at first
+"""Smallest fracture strain. Chosen value: if the constants give a negative fracture strain, a tet breaks at first
 yield."""
 _TWO_THIRDS = 2.0 / 3.0
 _TINY = 1e-300
@@ -75,8 +76,8 @@ _TINY = 1e-300
 
 @njit("int64(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def gather(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Copies the tets above their rate-free flow stress side by side into the scratch memory; returns their number. The
-    increment of each tet is in the bracket [0, q / 3 G].
+    """Copies the tets above their rate-free flow stress side by side into the scratch memory. Returns their number. The
+    plastic increment of each tet is in the bracket [0, q / 3 G], with the von Mises trial stress q.
     """
     m, shear3, softening = 0, 3.0 * params[SHEAR], params[_SOFTENING]
     for i in range(n):
@@ -187,7 +188,9 @@ def _open_first(w, m):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def increments(w, params, m, dt):  # type: ignore[no-untyped-def]
-    """Computes the strain increments of ``m`` tets in the scratch memory; returns the total number of iterations."""
+    """Computes the plastic strain increments of ``m`` tets in the scratch memory. Returns the total number of
+    iterations.
+    """
     sought, steps = m, 0
     for k in range(_MOST):
         steps += sought
@@ -233,11 +236,11 @@ def _return(w, s, params, m, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _wear(w, s, params, m, dt):  # type: ignore[no-untyped-def]
-    """Adds d / fracture strain to the damage, which is at most 1. The fracture strain is (D1 + D2 e^(D3 t)) (1 + D4 ln
-    rate) (1 + D5 T*).
+    """Adds d / fracture strain to the damage, with the plastic increment d. The damage is at most 1. The fracture
+    strain is (D1 + D2 e^(D3 t)) (1 + D4 ln rate) (1 + D5 T*).
 
-    t is the ratio of the tension -p to the flow stress, at most _MOST_TENSE, computed with the pressure at the start of
-    the step. Johnson and Cook 1985.
+    Here t is the ratio of the tension -p to the flow stress, at most _MOST_TENSE, computed with the pressure at the
+    start of the step. Source: Johnson and Cook 1985.
     """
     fast, per_span = 1.0 / (dt * params[_RATE]), 1.0 / (params[_MELT] - params[_T0])
     for j in range(m):
@@ -258,7 +261,7 @@ def _wear(w, s, params, m, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def johnson_cook(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial stress to the flow stress, for tets above their rate-free flow stress, and heats these tets."""
+    """Returns the trial stress to the flow stress, for tets above their rate-free flow stress. Heats these tets."""
     equivalent_stress(w, s, n)
     m = gather(w, s, params, n)
     if m == 0:
@@ -294,4 +297,4 @@ def _begin(law: JohnsonCook, temperature: float) -> dict[int, float]:
 
 
 LAW = Law("johnson_cook", BEFORE_PRESSURE, _rows, _constants, _begin, johnson_cook)
-"""Johnson-Cook strength law with heat from plastic work and with damage; erosion removes tets by their damage."""
+"""Johnson-Cook strength law with heat from plastic work, and with damage. Erosion removes tets by their damage."""

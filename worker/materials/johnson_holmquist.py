@@ -1,5 +1,5 @@
-"""Johnson-Holmquist 2 law of brittle materials. The strength depends on pressure, rate and damage; the pressure has
-bulking and a tension cut-off.
+"""Johnson-Holmquist 2 law of brittle materials. The strength depends on pressure, rate and damage. The pressure
+includes bulking and has a tension cut-off.
 
 Source: Johnson and Holmquist 1994. A step computes in this order (docs/theory/materials.md): pressure at n+1, with
 bulking and damage at n; strength at this pressure; return of the stress to the strength; damage and bulking at n+1.
@@ -68,8 +68,8 @@ _INTACT, _FRACTURE, _CRUMBLED, _FAST = (NODAL + k * CHUNK for k in range(4))
 _TINY = 1e-300
 """Smallest argument of a logarithm; an argument of zero is replaced by this value."""
 _LEAST = 0.05
-"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest; chosen value; this limit can only
-decrease the stable step."""
+"""Smallest bulk modulus in the wave speed, divided by the bulk modulus at rest. Chosen value: a limit of the bulk
+modulus from below can only decrease the stable step."""
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 
 
@@ -77,8 +77,8 @@ _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
     "UniTuple(float64, 2)(float64[::1], float64, float64, float64)", cache=True, error_model="numpy", forceinline=True
 )
 def _pressed(params, ratio, bulking, least):  # type: ignore[no-untyped-def]
-    """Returns the pressure and the tangent bulk modulus, with m = V0/V - 1. Under compression p = K m + K2 m^2 + K3 m^3
-    + bulking. In tension p = K m + bulking, but at least ``least`` = -T (1 - D).
+    """Returns the pressure and the tangent bulk modulus, with m = V0/V - 1. Under compression the pressure is p = K m +
+    K2 m^2 + K3 m^3 + bulking. In tension the pressure is p = K m + bulking, but at least ``least`` = -T (1 - D).
     """
     bulk, second, third = params[BULK], params[_K2], params[_K3]
     m = 1.0 / ratio - 1.0
@@ -90,8 +90,8 @@ def _pressed(params, ratio, bulking, least):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64, float64, float64, float64)", cache=True, error_model="numpy")
 def _stored(params, ratio, p, bulking, least):  # type: ignore[no-untyped-def]
-    """Returns the elastic energy of the pressure ``p`` of ``_pressed``, per initial volume, Pa; it is the integral of
-    -p over the volume ratio, from the ratio at zero pressure. Above the volume ratio at which the pressure is
+    """Returns the elastic energy of the pressure ``p``, computed by ``_pressed``, per initial volume, Pa: the integral
+    of -p over the volume ratio, from the ratio at zero pressure. Above the volume ratio at which the pressure is
     ``least``, the energy is constant; under compression the energy is computed as a triangle.
     """
     bulk = params[BULK]
@@ -128,11 +128,11 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
     """Computes the pressure of ``_pressed`` for a chunk. In the averaged pressure forms the pressure is the mean over
     the four nodes, each with its own cut-off, and the energy is summed over the nodes (elements/heat_and_bulking.py).
 
-    The plastic work has two parts; the first part is the difference between the work of the pressure of step n and the
-    work at the same ratio with the present bulking and damage. The second part is the work of the expansion beyond the
-    tension cut-off. Beyond the cut-off the pressure does not determine a volume ratio. The work is therefore computed
-    from the opening of the tet itself, not from the ratio at its nodes, which also contains the opening of neighbours
-    without tension.
+    The plastic work has two parts. The first part of the plastic work is the difference between the work of the
+    pressure of step n and the work at the same volume ratio with the present bulking and damage. The second part of the
+    plastic work is the work of the expansion beyond the tension cut-off. Beyond the cut-off the pressure does not
+    determine a volume ratio. The work is therefore computed from the opening of the tet itself, not from the ratio at
+    its nodes, which also contains the opening of neighbours without tension.
     """
     bulk, averaged = params[BULK], len(s) > _BULKING_STEP
     for i in range(n):
@@ -175,8 +175,8 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _factors(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Computes powers of the pressure, which are nearly zero if the pressure is zero. Computes the logarithm of the
-    squared relative rate, at least 0.
+    """Computes powers of the pressure, which are nearly zero if the pressure is zero. Also computes the logarithm of
+    the squared relative rate, which is at least 0.
     """
     per_pressure, tension = 1.0 / params[_PHEL], params[_T] / params[_PHEL]
     per_rate = _TWO_THIRDS / (params[_RATE] * params[_RATE])
@@ -281,12 +281,12 @@ def _constants(law: JohnsonHolmquist) -> tuple[float, ...]:
 
 
 PRESSURE_LAW = Equation("johnson_holmquist", DAMAGE + 1, lambda _: (), crumbling, volumes_by_ratio, CORNERS + 4)
-"""Equation of state of the Johnson-Holmquist law. The pressure contains bulking (a nodal mean in the averaged pressure
-forms) and the tension cut-off of the law."""
+"""Equation of state of the Johnson-Holmquist law. The pressure includes bulking (a nodal mean in the averaged pressure
+forms) and has the tension cut-off of the law."""
 LAW = Law(
     "johnson_holmquist", AFTER_PRESSURE, lambda _: DAMAGE + 1, _constants,
     lambda *_: {CORNERS + k: 1.0 for k in range(4)}, johnson_holmquist,
     PRESSURE_LAW.model,
 )  # fmt: skip
-"""Johnson-Holmquist strength law. Tension is limited to T (1 - D), so fully damaged material has no tensile
-strength."""
+"""Johnson-Holmquist strength law. Tension is limited to T (1 - D), with the tensile strength T and the damage D, so
+fully damaged material has no tensile strength."""

@@ -33,21 +33,21 @@ class Law:
     order: int
     """Position in the time step: FROM_SHAPE, BEFORE_PRESSURE or AFTER_PRESSURE."""
     rows: Callable[[Any], int]
-    """Function that returns the number of state rows of a tet (worker/model/rows.py) from the law's table in the
-    case."""
+    """Function that returns the number of state rows of a tet (worker/model/rows.py). Its argument is the table of the
+    law in the case."""
     constants: Callable[[Any], tuple[float, ...]]
-    """Function that returns the constants of the law from the law's table in the case. The constants are stored from
-    FIRST on."""
+    """Function that returns the constants of the law. Its argument is the table of the law in the case. The constants
+    are stored from FIRST on."""
     begin: Callable[[Any, float], dict[int, float]]
-    """Function that returns initial values of state rows from the law's table and the temperature, K. Rows whose
-    initial value is zero are omitted."""
+    """Function that returns initial values of state rows. Its arguments are the table of the law in the case and the
+    temperature, K. Rows whose initial value is zero are omitted."""
     kernel: Any
     equation: str = ""
-    """Name of the equation of state that belongs to the law. If the name is empty, the equation of state of the
-    material is used."""
+    """Name of the equation of state that belongs to the law. If the name is empty, the material chooses its equation of
+    state."""
     dilates: Callable[[Any], float] = lambda _: 0.0
-    """Function that returns the sine of the dilation angle from the law's table. If the sine is above zero, the law
-    uses row DILATION."""
+    """Function that returns the sine of the dilation angle. Its argument is the table of the law in the case. If the
+    sine is above zero, the law uses row DILATION."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,8 @@ class Equation:
     rows: int
     """Number of state rows of a tet."""
     constants: Callable[[Any], tuple[float, ...]]
-    """Function that returns the constants of the equation of state from its table in the case. The constants are stored
-    from EQUATION on."""
+    """Function that returns the constants of the equation of state. Its argument is the table of the equation in the
+    case. The constants are stored from EQUATION on."""
     kernel: Any
     volume: Any
     """Kernel(w, s, params, n) that sets VOLUME_SEEN at step n, m^3: the volume of solid and pores at the pressure of
@@ -73,6 +73,6 @@ class Equation:
 
 
 def placed(params: Floats, begin: int, constants: tuple[float, ...], room: int) -> None:
-    """Copies constants into ``params`` (SIZE,) from the place ``begin`` on; ``room``: largest number of constants."""
+    """Copies constants into ``params`` (SIZE,) from the place ``begin`` on. ``room``: largest number of constants."""
     assert len(constants) <= room
     params[begin : begin + len(constants)] = constants

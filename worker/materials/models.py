@@ -1,8 +1,8 @@
 """Lists of the strength laws and equations of state, and the kernels that call the law or equation of a block.
 
 The number of a law is its place in ``LAWS``; the number of an equation of state is its place in ``EQUATIONS``. A block
-stores the two numbers and one vector of constants. A new law needs a line in LAWS and a branch in ``strengthen``;
-tests/worker/test_laws.py checks that every law has a branch.
+stores the two numbers and one vector of constants. A new law needs a line in LAWS and a branch in ``strengthen``. The
+test tests/worker/test_laws.py checks that every law has a branch.
 """
 
 import math
@@ -75,7 +75,7 @@ def press(equation, w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(int64, float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def swell(equation, w, s, params, n):  # type: ignore[no-untyped-def]
-    """Sets VOLUME_SEEN of a chunk before the step, by the kernel of number ``equation`` in EQUATIONS."""
+    """Sets the row VOLUME_SEEN of a chunk before the step. The kernel is number ``equation`` in EQUATIONS."""
     if equation == 0:
         equation_of_state.volumes_by_pressure(w, s, params, n)
     else:
@@ -104,7 +104,7 @@ def equation_of(material: Material) -> Equation:
 
 
 def moduli(material: Material) -> tuple[float, float]:
-    """Returns bulk modulus at rest and shear modulus, Pa."""
+    """Returns the bulk modulus at rest and the shear modulus, Pa."""
     return material.bulk, material.elastic.shear
 
 

@@ -1,9 +1,10 @@
-"""Mohr-Coulomb strength of brittle materials: return of the deviatoric stress at constant pressure, or with dilation.
+"""Mohr-Coulomb strength of brittle materials: return of the deviatoric stress to the yield surface at constant
+pressure, or with dilation.
 
-f = (s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi) <= 0 with s1 >= s2 >= s3, tension positive, and s1 - s3 <= cap.
-Plastic flow either keeps the volume, or is given by f with the dilation angle psi in place of phi; in the second case
-the flow increases the pressure. Derived in docs/theory/materials.md. The functions that return the stress are inlined,
-because function calls would take three times as long.
+The yield surface is f = (s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi) <= 0 with the principal stresses s1 >= s2 >= s3,
+tension positive, and s1 - s3 <= cap. Plastic flow either keeps the volume, or is given by f with the dilation angle psi
+in place of phi; in the second case the flow increases the pressure. Derived in docs/theory/materials.md. The functions
+that return the stress are inlined, because function calls would take three times as long.
 """
 
 import math
@@ -36,8 +37,8 @@ from .turning import sine_and_cosine
 
 _SINE, _COHESION, _CAP, _FAILURE = FIRST, FIRST + 1, FIRST + 4, FIRST + 5
 _RESIDUAL = 2
-"""Offset between two groups of constants: from _SINE and _COHESION of intact material to the values of failed
-material."""
+"""Offset between two groups of constants: the group of intact material begins at _SINE and _COHESION, the group of
+failed material follows."""
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _STRAIN, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK
@@ -59,9 +60,9 @@ def principal(xx, yy, zz, yz, zx, xy):  # type: ignore[no-untyped-def]
     """Returns the principal values, the largest first, of a deviator with von Mises stress one. The error is of the
     order of round-off, even for equal principal values.
 
-    The isolated principal value x solves x^3 - x / 3 = det s. This equation is well conditioned and is solved by three
-    Newton steps from the chord. The distance between the other two principal values follows from s without x and its
-    projector (s^2 + x s + x^2 - 1/3) / (3 x^2 - 1/3).
+    The isolated principal value x of the deviator s solves x^3 - x / 3 = det s. The cubic equation for x is well
+    conditioned and is solved by three Newton steps from the chord. The distance between the other two principal values
+    follows from s without x and its projector (s^2 + x s + x^2 - 1/3) / (3 x^2 - 1/3).
     """
     det = xx * (yy * zz - yz * yz) + xy * (yz * zx - xy * zz) + zx * (xy * yz - yy * zx)
     size = abs(det)
@@ -89,11 +90,11 @@ def principal(xx, yy, zz, yz, zx, xy):  # type: ignore[no-untyped-def]
     forceinline=True,
 )
 def returned(d1, d2, d3, strength, sine, cap):  # type: ignore[no-untyped-def]
-    """Returns the principal deviatoric stresses d1 >= d2 >= d3 projected onto the yield surface; unchanged if they are
-    below the surface.
+    """Returns the principal deviatoric stresses d1 >= d2 >= d3 projected onto the yield surface. Stresses below the
+    yield surface are not changed.
 
     The yield surface is (1 + sine) d1 - (1 - sine) d3 <= strength and d1 - d3 <= cap. For the two planes the flow is
-    along (1, 0, -1), at constant d2; if this flow would change the order of the three values, two of the values are set
+    along (1, 0, -1), at constant d2. If the flow would change the order of the three values, two of the values are set
     equal, which gives a single point.
     """
     new = min(0.5 * (strength - (1.0 - sine) * d2), 0.5 * (cap - d2))
@@ -143,8 +144,8 @@ def dilated(d1, d2, d3, strength, sine, cap, psi, shear2, bulk):  # type: ignore
 @njit("void(float64[::1], float64[::1], int64, float64, float64, float64)", cache=True, error_model="numpy",
       forceinline=True)  # fmt: skip
 def grow(w, s, i, grown, subtracted, bulk):  # type: ignore[no-untyped-def]
-    """Adds a plastic volume strain ``grown`` to the pressure of tet ``i``, and adds its work, computed with the mean
-    pressure of the step.
+    """Adds a plastic volume strain ``grown`` to the pressure of tet ``i``. Also adds the work of the plastic volume
+    strain, computed with the mean pressure of the step.
 
     ``subtracted``: strain of the last step that the averaged pressure forms have subtracted from the old pressure.
     """
@@ -230,7 +231,7 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
             e1, e2, e3 = returned(d1, d2, d3, max(r * strength, 0.0), sine, r * cap)
         if e1 == d1:
             continue
-        # 4. Compute the tensor with the values e; add plastic strain and work.
+        # 4. Compute the tensor with the values e. Add plastic strain and work.
         nxx, nyy, nzz, nyz, nzx, nxy = with_values(sxx, syy, szz, syz, szx, sxy, d1, d2, d3, e1, e2, e3)
         s[_SXX + i], s[_SYY + i], s[_SZZ + i] = q * nxx, q * nyy, q * nzz
         s[_SYZ + i], s[_SZX + i], s[_SXY + i] = q * nyz, q * nzx, q * nxy

@@ -20,7 +20,7 @@ _STRAIN, _WORK, _YIELD = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * C
 
 @njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def equivalent_stress(w, s, n):  # type: ignore[no-untyped-def]
-    """Sets TRIAL to the von Mises stress sqrt(3/2 s : s), Pa."""
+    """Sets the row TRIAL to the von Mises stress sqrt(3/2 s : s), Pa, of the deviatoric stress s."""
     for i in range(n):
         sxx, syy, szz = s[_SXX + i], s[_SYY + i], s[_SZZ + i]
         syz, szx, sxy = s[_SYZ + i], s[_SZX + i], s[_SXY + i]
@@ -29,8 +29,8 @@ def equivalent_stress(w, s, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def return_radially(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Multiplies the trial stress by row FACTOR and adds the plastic work. TRIAL has the von Mises stress of the trial
-    stress. The plastic work is the work of the mean of the rotated old stress and the new stress (as in
+    """Multiplies the trial stress by row FACTOR and adds the plastic work. The row TRIAL has the von Mises stress of
+    the trial stress. The plastic work is the work of the mean of the rotated old stress and the new stress (as in
     mohr_coulomb.py).
     """
     shear2 = 2.0 * params[SHEAR]
@@ -55,7 +55,7 @@ def return_radially(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def linear_hardening(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Returns the trial stress to the yield surface. The strain increment (q - yield) / (3 G + H) is exact for this
-    law.
+    law, with the von Mises trial stress q, the shear modulus G and the hardening modulus H.
     """
     equivalent_stress(w, s, n)
     shear3, hardening = 3.0 * params[SHEAR], params[_HARDENING]

@@ -13,7 +13,7 @@ angle of a whole turn."""
 _MANY = Context(prec=120)
 """Number of additional decimal digits: as many as the largest angle of a case has before the decimal point."""
 _SMALL = Decimal("1e-40")
-"""Size of a term of a power series that no longer changes a float64."""
+"""Size of a term of a power series. A smaller term no longer changes a float64."""
 
 
 def _arc_tangent(n: int) -> Decimal:
@@ -30,7 +30,7 @@ _TURN = _MANY.subtract(_MANY.multiply(Decimal(32), _arc_tangent(5)), _MANY.multi
 
 
 def sine_and_cosine(angle: float) -> tuple[float, float]:
-    """Returns sine and cosine of an ``angle``, radians, below 1e60. The computation takes the remainder of whole turns,
+    """Returns sine and cosine of an ``angle``, radians, below 1e60. The function subtracts whole turns from the angle,
     sums power series in decimals, and rounds the sums.
     """
     x = _MANY.remainder(Decimal(angle), _TURN)

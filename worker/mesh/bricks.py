@@ -1,4 +1,4 @@
-"""Cuts of hexahedra, wedges and pyramids of a file into tets, and notes to the user about the cuts."""
+"""Cuts of hexahedra, wedges and pyramids of a mesh file into tets, and notes to the user about these cuts."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -15,7 +15,8 @@ from .model import Floats, Ids
 from .patterns import QUADS, skin
 
 _SEEN = 1e-6
-"""Share of the volume below which no note is given; chosen value: the round-off of coordinates with six digits."""
+"""Change of the volume as a fraction of the volume. For a smaller change no note is given. Chosen value: the round-off
+of coordinates with six digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +28,7 @@ class Bricks:
     numbers: Ids
     lines: Ids
     forms: list[Form]
-    """Form of each kind of element. The list has the order of the kinds."""
+    """Form of each kind of element, in the order of the kinds."""
     counts: list[int]
 
     def called(self, k: int) -> str:
@@ -99,7 +100,9 @@ def _fitting(nodes: Ids, triangles: Ids) -> Ids:
 
 
 def _known(faces: Ids, triangles: Ids) -> "np.ndarray":
-    """Return (m, k) whether each of the faces (m, k, 3) is among the triangles, in any rotation of the corners."""
+    """Return (m, k) True for each of the faces (m, k, 3) that is among the triangles, in any rotation of the
+    corners.
+    """
     both = np.sort(np.concatenate([triangles, faces.reshape(-1, 3)]), axis=1)
     _, of = np.unique(both, axis=0, return_inverse=True)
     of = of.reshape(-1)
@@ -122,8 +125,8 @@ def triangles_of(cells: list[Cells]) -> Ids:
 
 
 def notes_of_cut(some: Bricks, made: Cut, points: Floats, volume: float) -> Iterator[str]:
-    """Return notes: the number of tets into which the elements were cut, and the effect of warped faces on the
-    ``volume``.
+    """Return two kinds of notes: the number of tets into which the elements were cut, and the effect of warped faces on
+    the ``volume``.
     """
     if not len(some.numbers):
         return
@@ -154,8 +157,8 @@ def _warped(nodes: Ids, points: Floats) -> float:
 
 
 def notes_of_middles(cells: list[Cells], points: Floats, tags: Ids) -> Iterator[str]:
-    """Return notes about hexahedra, wedges and pyramids of second order, and the volume that is lost because only their
-    corners are used.
+    """Return notes about hexahedra, wedges and pyramids of second order. Also return the volume that is lost because
+    only the corners of these elements are used.
 
     Raises MeshError if a node is not near the middle of its edge.
     """

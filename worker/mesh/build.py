@@ -30,13 +30,13 @@ from .store import load, save
 from .structured import structured
 
 _CACHE_BYTES = 4 * 2**30
-"""Largest size of the cache, bytes; above this size the least recently used meshes are removed."""
+"""Largest size of the cache, bytes. If the cache is larger, the least recently used meshes are removed."""
 
 
 def build(
     mesh: Mesh, folder: Path, key: str = "mesh", limits: Limits | None = None, made: Callable[[], None] = lambda: None
 ) -> TetMesh:
-    """Return the tets of ``mesh``: checked, in Morton order, bit-identical in every call. Raises MeshError.
+    """Return the checked tets of ``mesh``, in Morton order, bit-identical in every call. Raises MeshError.
 
     ``folder``: folder to which the path of a mesh file is relative; ``key``: key of the mesh in its case, for messages;
     ``made``: function that is called before a mesh is made; ``limits``: limits of the child process that runs gmsh and
@@ -59,8 +59,8 @@ def build(
 def build_together(
     meshes: Mapping[str, Mesh], folder: Path, limits: Limits | None = None, made: Callable[[], None] = lambda: None
 ) -> list[TetMesh]:
-    """Return the tets of ``meshes``, by their keys, with common nodes at their interfaces (mesh/together.py). Raises
-    MeshError.
+    """Return the tets of ``meshes``, with common nodes at their interfaces (mesh/together.py), as a dictionary with the
+    keys of ``meshes``. Raises MeshError.
     """
     key = next(iter(meshes))
     _need_gmsh(key)
@@ -87,8 +87,8 @@ def _loaded(target: Path, count: int) -> list[TetMesh] | None:
 
 @contextlib.contextmanager
 def _writable(target: Path) -> Iterator[Path]:
-    """Yield ``target`` if it can be written, else a path of the same name in a temporary folder. A run without a
-    writable cache continues, but makes its mesh again.
+    """Yield ``target`` if the file can be written, else a path of the same name in a temporary folder. A run without a
+    writable cache continues, but the next run makes the mesh again.
     """
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -103,7 +103,7 @@ def _writable(target: Path) -> Iterator[Path]:
 
 
 def _changed(mesh: TetMesh) -> bool:
-    """Return whether a file that the mesh file includes has changed or was removed."""
+    """Return True if a file that the mesh file includes has changed or was removed."""
     for path, digest in mesh.origin.included if mesh.origin is not None else ():
         try:
             with whole.opened(path) as file:

@@ -39,7 +39,7 @@ class Kind:
     """Elements of one form and order.
 
     In elements of second order each of the ``edges`` has a midside node. The midside nodes follow the corners, in the
-    order of ``edges``. ``nodes`` is the number of all nodes; nodes after the midside nodes are ignored.
+    order of ``edges``. ``nodes`` is the number of all nodes of an element. Nodes after the midside nodes are ignored.
     """
 
     form: Form
@@ -57,7 +57,7 @@ class Cells:
     nodes: Ids
     """(m, kind.nodes) tags of the nodes of each element."""
     lines: Ids
-    """(m,) line of each element in the file; 0 if the format has no line numbers."""
+    """(m,) line of each element in the file; 0 if the format of the file has no line numbers."""
 
     @property
     def corners(self) -> Ids:

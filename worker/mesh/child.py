@@ -1,7 +1,7 @@
 """Child process that runs gmsh and reads foreign files: ``python -m conoid.worker.mesh.child``.
 
 gmsh is GPL, and gmsh and any parser may crash, hang or request all memory. Therefore meshers and readers run in a
-separate process; this process has limits of memory, CPU time and wall time, an environment without secrets, and an
+separate process. This process has limits of memory, CPU time and wall time, an environment without secrets, and an
 empty working folder. The process reads one JSON request from standard input. The process writes the mesh to an .npz
 file, and an error to standard error as one line.
 """
@@ -36,8 +36,8 @@ _LOOK = 0.2
 """Interval between two checks of a running child process, s."""
 
 _FULL = 0.97
-"""Fraction of the memory limit of a child process; above this fraction the child may have too little memory to report
-an error."""
+"""Fraction of the memory limit of a child process. A child process above this fraction of its limit may have too little
+memory to report an error."""
 
 _GRACE = 5
 """CPU time between the signal at the CPU limit and the end of a child process, s. Chosen value."""
@@ -55,8 +55,8 @@ class Limits:
     wall: int = 900
 
     def allowed(self) -> "Limits":
-        """Return these limits, each reduced to the hard limit of this process (``ulimit -H``) if the hard limit is
-        lower.
+        """Return these limits. Each limit is reduced to the hard limit of this process (``ulimit -H``) if the hard
+        limit is lower.
         """
         memory, cpu = (resource.getrlimit(which)[1] for which in (resource.RLIMIT_AS, resource.RLIMIT_CPU))
         none = resource.RLIM_INFINITY
@@ -99,7 +99,7 @@ def run_child(mesh: Mesh | Mapping[str, Mesh], sources: Sources, target: Path, k
 
 
 def _watched(child: subprocess.Popen[bytes], request: bytes, key: str, limits: Limits) -> bytes:
-    """Wait for the end of the child process and return its standard error; if the child exceeds a limit, end it and
+    """Wait for the end of the child process and return its standard error. If the child exceeds a limit, end it and
     raise MeshError.
 
     The parent also checks the memory of the child, because Python can loop for ever if not even an exception fits into
@@ -198,8 +198,8 @@ def beside(target: Path, k: int) -> Path:
 
 
 def perform_together(meshes: dict[str, Mesh], sources: Sources, target: Path) -> None:
-    """Make several meshes with common nodes at their interfaces, and store each mesh. ``meshes`` has the keys of the
-    meshes in the case.
+    """Make several meshes with common nodes at their interfaces, and store each mesh. The keys of ``meshes`` are the
+    keys of the meshes in the case.
     """
     from .model import check
     from .order import morton_ordered

@@ -4,7 +4,7 @@ Each quadrilateral face is cut by the diagonal through the smallest of its four 
 at a face cut it by one diagonal, on any rank. An element can be cut with the diagonals of its faces (Dompierre, Labbe,
 Vallet, Camarero 1999, "How to subdivide pyramids, prisms and hexahedra into tetrahedra"). If an element has several
 possible cuts, the cut with the longest stable step is chosen. If a node in the middle of the element gives a far longer
-stable step than any cut, this node is added.
+stable step than any cut, the node in the middle is added.
 """
 
 from collections.abc import Iterator
@@ -17,11 +17,11 @@ from .model import FLAT, Floats, Ids, step_lengths, volume_and_area
 from .patterns import QUADS, cuts, skin
 
 _TOGETHER = 20_000
-"""Number of elements that are processed at once; the chosen value needs about 100 MB of memory."""
+"""Number of elements that are processed at once. Chosen value: they need about 100 MB of memory."""
 _NOTHING = np.zeros((0, 4), np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
 _WORSE = 0.5
-"""Ratio of the stable step of a cut to that of a cut with a node in the middle; below this ratio the node in the middle
-is used. Chosen value: twelve tets instead of five or six cost less than twice the number of steps."""
+"""Ratio of the stable step of a cut to that of a cut with a node in the middle, below which the node in the middle is
+used. Chosen value: twelve tets instead of five or six take less than twice the number of steps."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Cut:
     of: Ids
     """(j,) element of each middle node."""
     flat: Ids
-    """Elements without a cut into tets of positive volume."""
+    """Elements that have no cut into tets of positive volume."""
 
 
 def cut(nodes: Ids, points: Floats, diagonals: Ids) -> Cut:
@@ -52,8 +52,8 @@ def cut(nodes: Ids, points: Floats, diagonals: Ids) -> Cut:
 
 
 def pattern(nodes: Ids) -> Ids:
-    """Return (m,) the diagonals of the faces (``patterns.cuts``); the diagonal of a face contains its smallest node
-    number; if numbers are equal, the first of them counts.
+    """Return (m,) the diagonals of the faces (``patterns.cuts``). The diagonal of a face contains its smallest node
+    number. If two node numbers are equal, the first of them is used.
     """
     rank = np.argsort(np.argsort(nodes, axis=1, kind="stable"), axis=1, kind="stable")
     second = rank[:, QUADS].argmin(axis=2) % 2
@@ -61,7 +61,9 @@ def pattern(nodes: Ids) -> Ids:
 
 
 def halves(quads: Ids) -> Ids:
-    """Return (2 n, 3) the triangles of quadrilaterals (n, 4), cut through the smallest of the four node numbers."""
+    """Return (2 n, 3) triangles. Each of the quadrilaterals (n, 4) is cut through the smallest of its four node
+    numbers.
+    """
     odd = (quads.argmin(axis=1) % 2 == 1)[:, None]
     rolled = np.where(odd, np.roll(quads, -1, axis=1), quads)
     return rolled[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
@@ -132,6 +134,6 @@ def _shortest(points: Floats, tets: Ids, names: Ids) -> Floats:
 
 
 def _repeats(tets: Ids) -> NDArray[np.bool_]:
-    """Return which of the tets (..., 4) contain a node twice."""
+    """Return flags of the tets (..., 4): True for each tet that contains a node twice."""
     ordered = np.sort(tets, axis=-1)
     return np.asarray((ordered[..., 1:] == ordered[..., :-1]).any(axis=-1))

@@ -12,8 +12,8 @@ FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]], np.int32)
 
 
 def boundary_faces(tets: Ints) -> Ints:
-    """Return (k, 3) nodes of the faces that belong to one tet only, in the order of tet and local face; the normals
-    point outward.
+    """Return (k, 3) nodes of the faces that belong to one tet only, in the order of tet and local face. The normals of
+    the faces point outward.
     """
     faces = tets[:, FACES].reshape(-1, 3)
     group, size = _groups(faces)
@@ -22,8 +22,8 @@ def boundary_faces(tets: Ints) -> Ints:
 
 
 def same_side(tets: Ints) -> NDArray[np.int64]:
-    """Return (k, 2) pairs of positively oriented tets on the same side of a common face; the two tets of a pair
-    overlap.
+    """Return (k, 2) pairs of overlapping tets. The two tets of a pair are positively oriented and lie on the same side
+    of a common face.
 
     If more than two tets are on one side, every two successive tets form a pair.
     """

@@ -11,8 +11,8 @@ _TET = Form.TET.inside
 
 
 def folded(nodes: Ids) -> tuple[Ids, NDArray[np.bool_]]:
-    """Return three arrays: the hexahedra (m, 8), the hexahedra with only four different nodes as tets, and which
-    elements can have a volume.
+    """Return three arrays: the hexahedra (m, 8); the tets, which are hexahedra with only four different nodes; and
+    flags of the elements that can have a volume.
 
     An element can have a volume only if repeated nodes are connected by edges, and if no face has two equal opposite
     corners.
@@ -31,8 +31,8 @@ def folded(nodes: Ids) -> tuple[Ids, NDArray[np.bool_]]:
 
 
 def _folds(first: Ids) -> bool:
-    """Return whether the repeated nodes of each element are allowed (``folded``). ``first`` gives, for each node, the
-    first position of that node in the element.
+    """Return flags of the elements: True if the repeated nodes of the element are allowed (``folded``). ``first``
+    gives, for each node, the first position of that node in the element.
     """
     reached = np.arange(8)
     for _ in range(8):

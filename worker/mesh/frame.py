@@ -1,7 +1,7 @@
 """Local frame of a body. The origin is the point where the sector is cut; the third direction is the axis of the body.
 
-The generators work in the frame (a, b, c): the directions of ``across(axis)`` and ``axis`` in cyclic order. The
-generators rotate the points at the end, so each body is implemented for one axis only. The rotation only permutes
+The generators work in the frame (a, b, c), which has the directions of ``across(axis)`` and ``axis`` in cyclic order.
+The generators rotate the points at the end, so each body is implemented for one axis only. The rotation only permutes
 coordinates and is exact.
 """
 
@@ -13,7 +13,7 @@ from ..errors import MeshError
 from .model import MAX_TETS, Floats
 
 TETS_PER_CUBE = 6.0
-"""Number of tets that a generator makes in a volume of element_size^3."""
+"""Number of tets that a generator makes in a cube with the edge element_size."""
 
 
 def directions(body: Generated) -> list[int]:

@@ -68,5 +68,5 @@ def named_mesh(gmsh: Any) -> NamedMesh:
 
 
 def first_error(gmsh: Any) -> str | None:
-    """Return the first error in the log of gmsh; gmsh continues after many errors."""
+    """Return the first error in the log of gmsh. gmsh continues after many errors."""
     return next((line.removeprefix("Error: ") for line in gmsh.logger.get() if line.startswith("Error")), None)

@@ -15,11 +15,11 @@ from .model import Floats, Ids, Ints, Origin
 from .sharing import same_places
 
 _SAME = 1e-9
-"""Distance, divided by the size of a body, below which nodes of structured meshes are merged; the chosen value is far
-above round-off."""
+"""Distance between two nodes, divided by the size of a body. Nodes of structured meshes with a smaller distance are
+merged. Chosen value: far above round-off."""
 
 Placed = tuple[int, Origin | None, Floats]
-"""A part: the index of its first node, the origin of its mesh, and its nodes (n, 3), m, after its rotation."""
+"""Data of a part: the index of its first node, the origin of its mesh, and its nodes (n, 3), m, after its rotation."""
 
 
 def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
@@ -49,8 +49,8 @@ def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
 def _refuse_open(case: Case, placed: Mapping[int, Placed], stands: Ids) -> None:
     """Raise InputError if two parts of one body have coincident faces but no bond.
 
-    Without a bond the parts would separate at these faces, and no contact would act between them. ``stands``: the
-    result of ``joined``.
+    Without a bond the parts would separate at their coincident faces, and no contact would act between them.
+    ``stands``: the result of ``joined``.
     """
     body = bodies(case)
     numbers = {part.name: i for i, part in enumerate(case.parts)}
@@ -64,7 +64,7 @@ def _refuse_open(case: Case, placed: Mapping[int, Placed], stands: Ids) -> None:
 
 
 def _wide(x: Floats) -> bool:
-    """Return whether points (n, 3) span a plane: they are neither coincident nor collinear."""
+    """Return True if points (n, 3) span a plane, that is, if they are neither coincident nor collinear."""
     if len(x) < 3:
         return False
     d = x - x[0]
@@ -87,7 +87,7 @@ def _common(one: Origin | None, x: Floats, other: Origin | None, y: Floats) -> t
 
 
 def _lines(values: Floats) -> Ids:
-    """Return (n,) integers that are equal for coordinates that are equal within round-off."""
+    """Return (n,) integers. Coordinates that are equal within round-off get equal integers."""
     order = np.argsort(values, kind="stable")
     steps = np.diff(values[order], prepend=values[order[:1]])
     numbers = np.empty(len(values), np.int64)

@@ -10,7 +10,7 @@ from .model import NodeSet
 _KINDS = {"nodes": False, "surface": True}
 """Words before a colon, in a name such as ``nodes:NAME``, that select the kind of a set."""
 _SHOWN = 20
-"""Largest number of names in a message; the chosen value gives three lines of a terminal."""
+"""Largest number of names in a message. Chosen value: they fill three lines of a terminal."""
 
 
 def meant(sets: Sequence[NodeSet], name: str) -> NodeSet | None:
@@ -36,8 +36,8 @@ def meant(sets: Sequence[NodeSet], name: str) -> NodeSet | None:
 
 
 def _called(sets: Sequence[NodeSet], name: str) -> list[NodeSet]:
-    """Return the sets with this name. If no set of a kind has exactly this name, return the sets of that kind whose
-    names differ in the case of letters only.
+    """Return the sets with the given name. If no set of a kind has exactly this name, return the sets of that kind
+    whose names differ from it only in the case of letters.
     """
     found = list[NodeSet]()
     for surfaces in (True, False):
@@ -57,6 +57,6 @@ def _same(one: NodeSet, other: NodeSet) -> bool:
 
 
 def known(sets: Sequence[NodeSet]) -> str:
-    """Return the names of all sets as text for messages."""
+    """Return the names of all sets as a text for messages."""
     names = list(dict.fromkeys(each.names[0] for each in sets))
     return ", ".join([*names[:_SHOWN], *(["..."] if len(names) > _SHOWN else [])]) or "none"

@@ -17,12 +17,12 @@ _CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, -1, 1], [-1, 1, -1]]) / math.s
 """Corners of the regular tet of edge 1, relative to its centre; in this order the volume is positive."""
 
 _RANDOM = 15
-"""Count of random numbers for a shard: 3 for its rotation, 12 for shifts of its nodes."""
+"""Number of random numbers for a shard: 3 for its rotation, 12 for shifts of its nodes."""
 
 
 def shards(body: Shards) -> TetMesh:
-    """Return a mesh of shards. Each shard is in the middle of its own cube, gets a uniformly random rotation, and then
-    random shifts of its nodes.
+    """Return a mesh of shards. Each shard is in the middle of its own cube. A shard gets a uniformly random rotation,
+    and then random shifts of its nodes.
     """
     cubes = np.array(list(itertools.product(*map(range, body.count))), np.float64)
     random = uniform(np.arange(_RANDOM * len(cubes)), body.seed).reshape(-1, _RANDOM)
@@ -33,7 +33,9 @@ def shards(body: Shards) -> TetMesh:
 
 
 def rotations(random: Floats) -> Floats:
-    """Return (n, 3, 3) uniformly distributed rotations, made from random numbers (n, 3) in [0, 1): Shoemake 1992."""
+    """Return (n, 3, 3) uniformly distributed rotations, made from random numbers (n, 3) in [0, 1). Source: Shoemake
+    1992.
+    """
     one, two = np.sqrt(1.0 - random[:, 0]), np.sqrt(random[:, 0])
     a, b = 2.0 * math.pi * random[:, 1], 2.0 * math.pi * random[:, 2]
     (sine_a, cosine_a), (sine_b, cosine_b) = sines_and_cosines(a), sines_and_cosines(b)

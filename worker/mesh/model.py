@@ -31,8 +31,9 @@ REGULAR_STEP = 1.0 / math.sqrt(6.0)
 """Step length of the regular tet with edge 1: half its altitude."""
 
 FLAT = 1e-9
-"""Smallest ratio of the volume of a tet to (root of the sum of its squared face areas)^(3/2); below this ratio the tet
-counts as flat. Chosen value: the ratio is 0.15 for a regular tet, and 1e-16 for the round-off of its nodes."""
+"""Smallest ratio of the volume of a tet to (root of the sum of its squared face areas)^(3/2). A tet with a smaller
+ratio of volume to areas counts as flat. Chosen value: the ratio is 0.15 for a regular tet, and 1e-16 for the round-off
+of its nodes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +43,9 @@ class Origin:
     file: str
     """sha256 of the bytes of the file, and of the files that it includes."""
     nodes: Ids
-    """(n,) number of each node in the file, unique there."""
+    """(n,) number of each node in the file, unique in the file."""
     notes: tuple[str, ...] = ()
-    """Contents of the file that are not in the mesh or are interpreted in an unexpected way, one line each."""
+    """Contents of the file that are not in the mesh or are interpreted in an unexpected way; one text for each."""
     included: tuple[tuple[str, str], ...] = ()
     """Path and sha256 of each further file that was read for the mesh."""
 
@@ -60,7 +61,8 @@ class NodeSet:
     faces: Ints | None = None
     """(n, 3) faces of a surface that are outer faces of the mesh; None for a set of nodes."""
     inner: int = 0
-    """Number of faces of the surface that are inside of the mesh; all nodes of such a face are nodes of the mesh."""
+    """Number of faces of the surface that are inside of the mesh. All nodes of an inner face of the surface are nodes
+    of the mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,15 +94,15 @@ class TetMesh:
     def step_lengths(self) -> Floats:
         """Return (m,) 1 / sqrt(sum |grad N|^2), m, with the sign of the volume.
 
-        The stable time step is this length divided by the speed of sound (lumped linear tets: omega_max^2 <= 4 c^2
-        sum |grad N|^2).
+        The stable time step is the returned step length divided by the speed of sound (lumped linear tets: omega_max^2
+        <= 4 c^2 sum |grad N|^2).
         """
         return step_lengths(self.points, self.tets)
 
 
 @dataclass(frozen=True)
 class Names:
-    """Numbers of the nodes, (n,), and of the tets, (m,), in the file of a mesh."""
+    """Numbers that the nodes (n,) and the tets (m,) have in the file of a mesh."""
 
     nodes: Ids
     tets: Ids
@@ -123,7 +125,7 @@ def check(mesh: TetMesh, names: Names | None = None) -> TetMesh:
     """Return the mesh if a run can use it, else raise MeshError.
 
     Conditions: finite coordinates, at least one tet, every index in range, every node used, every volume positive.
-    Messages use ``names`` of nodes and tets if given, otherwise indices from 0.
+    Messages use the ``names`` of nodes and tets if they are given, otherwise indices from 0.
     """
     points, tets = mesh.points, mesh.tets
     names = names or Names(np.arange(len(points)), np.arange(len(tets)))

@@ -17,14 +17,14 @@ class NamedMesh:
     mesh: TetMesh
     names: Names
     places: Ids
-    """(n,) number of each node in the file, unique there."""
+    """(n,) number of each node in the file, unique in the file."""
     notes: tuple[str, ...] = ()
-    """Contents of the file that are not in the mesh or are interpreted in an unexpected way, one line each."""
+    """Contents of the file that are not in the mesh or are interpreted in an unexpected way; one text for each."""
 
 
 def gathered(node_tags: Ids, points: Any, tet_tags: Ids, corners: Ids) -> NamedMesh:
-    """Return tets (m, 4) as indices of the nodes that they use. ``corners`` gives the tags of the nodes; the used nodes
-    are ordered by tag.
+    """Return tets (m, 4) as indices of the nodes that they use. ``corners``: tags of the corners of the tets. The used
+    nodes are ordered by tag.
     """
     order = np.argsort(node_tags, kind="stable")
     used, tets = np.unique(corners, return_inverse=True)

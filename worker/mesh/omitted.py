@@ -9,7 +9,7 @@ from .cells import Cells
 from .model import Ids
 
 _SHOWN = 5
-"""Largest number of sets in a note; the chosen value gives one or two lines of a terminal."""
+"""Largest number of sets in a note. Chosen value: they fill one or two lines of a terminal."""
 
 
 def notes(passed: Counter[str], volumes: Counter[str], joining: Counter[str], mark: str) -> Iterator[str]:
@@ -28,7 +28,9 @@ def notes(passed: Counter[str], volumes: Counter[str], joining: Counter[str], ma
 
 
 def by_corners(chosen: Iterable[Cells]) -> Iterator[str]:
-    """Return notes about the chosen hexahedra of second order; only the corners of these hexahedra are used."""
+    """Return notes about the chosen hexahedra of second order. Only the corners of hexahedra of second order are
+    used.
+    """
     for each in chosen:
         if each.kind.nodes > 10 and len(each.numbers):
             yield f"{len(each.numbers):,} hexahedra of {each.kind.nodes} nodes are read with their corners only"

@@ -1,8 +1,8 @@
 """Order of nodes and tets along the Morton curve: neighbours in space become neighbours in memory.
 
-A kernel over tets reads and writes values of nodes, so the order determines the rate of cache hits. Kernels on
-unstructured meshes run 1.3 to 1.6 times as fast as without this order; with this order the numbering does not depend on
-the generator or the file of the mesh.
+A kernel over tets reads and writes values of nodes, so the order determines the rate of cache hits. On unstructured
+meshes kernels run 1.3 to 1.6 times as fast with nodes and tets along the Morton curve as without this order. In
+addition, the numbering does not depend on the generator or the file of the mesh.
 """
 
 from dataclasses import replace
@@ -21,13 +21,13 @@ _SPREAD = [
     (4, 0x10C30C30C30C30C3),
     (2, 0x1249249249249249),
 ]
-"""Shifts and masks that put two zero bits after each of 21 bits. Each step moves the halves of a block of bits
+"""Shifts and masks that insert two zero bits after each of 21 bits. Each step moves the two halves of a block of bits
 apart."""
 
 
 def morton_codes(points: Floats, low: Floats, edge: float) -> NDArray[np.uint64]:
-    """Return (n,) positions of ``points``, (n, 3), along the Z-curve through a cube. The low corner of the cube is
-    ``low``, (3,), its edge is ``edge``, m.
+    """Return (n,) positions of ``points``, (n, 3), along the Z-curve through a cube. ``low`` (3,): low corner of the
+    cube; ``edge``: length of its edge, m.
 
     Each coordinate has 21 bits in the code; x varies fastest.
     """

@@ -37,7 +37,7 @@ def cuts(pattern: int) -> NDArray[np.int64]:
     """Return (n, MOST, 4) the cuts of a hexahedron without additional nodes.
 
     If bit f of ``pattern`` is 1, the diagonal of face f connects its second and fourth node, else its first and third
-    node. A cut into five tets has a last row 0, 0, 0, 0. For some patterns there is no cut, and n is 0.
+    node. If a cut has five tets, its last row is 0, 0, 0, 0. For some patterns there is no cut, and n is 0.
     """
     found = sorted(set(_completed(frozenset(_turned(face) for face in skin(pattern)), ())))
     table = np.zeros((len(found), MOST, 4), np.int64)
@@ -55,7 +55,8 @@ def skin(pattern: int) -> list[Triangle]:
 
 
 def _completed(front: frozenset[Triangle], made: tuple[Tet, ...]) -> Iterator[tuple[Tet, ...]]:
-    """Yield all cuts that begin with the tets ``made`` and fill the volume enclosed by the triangles of the ``front``.
+    """Yield all cuts that begin with the tets ``made``. The cuts fill the volume that is enclosed by the triangles of
+    the ``front``.
 
     Positive tets whose inner faces cancel fill a body exactly once, so no other test is needed.
     """

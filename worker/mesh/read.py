@@ -1,9 +1,9 @@
-"""Reader of mesh files, for the child process: files are untrusted input.
+"""Reader of mesh files, for the child process. The files are untrusted input.
 
 Conoid has its own readers, because gmsh and meshio fail on some files. gmsh treats a .msh file without a known header
 as a script, which can start programs. gmsh adds ghost cells to the elements without a message. In the format 2.2 gmsh
 adds all tets of an entity to the group of any of these tets. meshio ends the process if an .inp file has an unknown
-element type; meshio also ignores the positions of instances and does not name the line of an error.
+element type. meshio also ignores the positions of instances, and does not report the line of an error.
 """
 
 import hashlib
@@ -28,7 +28,7 @@ from .vtu.reading import read_vtu
 
 def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
     """Return the checked mesh of the file ``path``, in m, or of its group ``file.group`` if that is given. Raises
-    MeshError, naming ``key``.
+    MeshError; its message contains ``key``.
 
     Unused nodes and elements without volume are omitted. A volume element that cannot be cut into tets is an error.
     """

@@ -1,5 +1,5 @@
 """Conversion of coordinates into metres with a single rounding. A product with 0.001 would round twice, because 0.001
-is no binary fraction.
+is not a binary fraction.
 """
 
 from fractions import Fraction
@@ -9,14 +9,14 @@ from .model import Floats
 _SPLITTER = 2.0**27 + 1.0
 """Factor that splits a float64 into two halves of 26 bits (Dekker 1971, Numer. Math. 18, 224)."""
 _WHOLE = 2**53
-"""Integers below this bound are exact as float64."""
+"""Bound of integers that are exact as float64."""
 
 
 def scaled(points: Floats, unit: float) -> Floats:
     """Return points in m from points in units of ``unit`` m. Each coordinate is multiplied by the decimal number of
     ``unit`` and rounded once.
 
-    If this decimal number is not a fraction of integers below 2^53, the product rounds twice.
+    If the decimal number of ``unit`` is not a fraction of integers below 2^53, the product rounds twice.
     """
     exact = Fraction(repr(unit))
     n, d = exact.numerator, exact.denominator

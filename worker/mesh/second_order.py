@@ -16,10 +16,10 @@ from .model import FLAT, Floats, Ids, step_lengths, volume_and_area
 Way = Literal["eight", "corners"]
 
 LOST = 1e-3
-"""Fraction of the volume that may be lost if edges are made straight. If more would be lost, tets are cut into eight;
-chosen value: the mass has the same error, and eight tets with half the step cost 16 times as much as one tet."""
+"""Fraction of the volume that may be lost if edges are made straight. If more would be lost, tets are cut into eight.
+Chosen value: the mass has the same error, and eight tets with half the time step take 16 times as long as one tet."""
 _OFF = 0.4
-"""Largest distance of a midside node from the middle of its edge, divided by the length of the edge; chosen value: the
+"""Largest distance of a midside node from the middle of its edge, divided by the length of the edge. Chosen value: the
 ratio is 0.25 for quarter points, and 0.21 for an arc of 90 degrees. A ratio of 0.5 means that the file has another
 order of nodes: the node is in the middle of another edge of a regular tet."""
 _CORNERS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3))
@@ -51,7 +51,7 @@ def lost(cells: Cells, points: Floats) -> float:
     of ``points``.
 
     The weight of a midside node is a third of the area of each face at its edge, which is the integral of its shape
-    function. The third is exact for triangles and for quadrilaterals of eight nodes.
+    function. The factor of one third is exact for triangles and for quadrilaterals of eight nodes.
     """
     total = 0.0
     for side in sides(cells.kind.form):
@@ -64,7 +64,7 @@ def lost(cells: Cells, points: Floats) -> float:
 
 
 def _area(corners: Sequence[Floats]) -> Floats:
-    """Return (m, 3) area vectors of triangles or quadrilaterals; the vectors point outward."""
+    """Return (m, 3) area vectors of triangles or quadrilaterals. The vectors point outward."""
     a, b, c, d = (*corners, corners[0])[:4]
     return np.asarray(0.5 * (np.cross(b - a, c - a) if len(corners) == 3 else np.cross(c - a, d - b)))
 

@@ -22,7 +22,7 @@ class Named:
     faces: tuple[Ids, ...] | None = None
     """Triangles (n, 3) and quadrilaterals (n, 4) of a surface, given by their corners; None for a set of nodes."""
     free: bool = False
-    """Whether all faces of the surface are outer faces of the mesh."""
+    """True if all faces of the surface must be outer faces of the mesh."""
 
 
 def surface(names: tuple[str, ...], faces: Iterable[Ids], free: bool = False) -> Named:
@@ -52,9 +52,9 @@ class Members:
     """The members of the sets of a file that belong to a mesh."""
 
     def __init__(self, used: Ids, tets: Ints, edges: Ids) -> None:
-        """``used``: (n,) the index in the file of each node of the mesh, ascending; ``tets``: (m, 4) indices into
-        ``used``. ``edges``: (k, 3) indices of two corners and of the node between them, if tets of ten nodes were
-        cut into eight.
+        """``used``: (n,) the index in the file of each node of the mesh, ascending; ``tets``: (m, 4) nodes of the tets,
+        as indices into ``used``. ``edges``: (k, 3) indices of two corners and of the node between them; it is given if
+        tets of ten nodes were cut into eight.
         """
         self._used = used
         self._outer = np.unique(np.sort(boundary_faces(tets), axis=1), axis=0)
@@ -81,20 +81,24 @@ class Members:
         )
 
     def _indices(self, places: Ids) -> tuple[Ints, NDArray[np.bool_]]:
-        """Return the indices in the mesh of nodes of the file, and whether each node is in the mesh."""
+        """Return the indices in the mesh of nodes of the file. Also return flags: True for each node that is in the
+        mesh.
+        """
         if not len(self._used):
             return np.zeros(places.shape, np.int32), np.zeros(places.shape, bool)
         found = np.minimum(np.searchsorted(self._used, places), len(self._used) - 1)
         return found.astype(np.int32), self._used[found] == places
 
     def _whole(self, faces: Ids) -> Ids:
-        """Return the faces whose corners are all in the mesh; each face once."""
+        """Return the faces whose corners are all in the mesh. Each face is returned once."""
         there = self._indices(faces)[1].all(axis=1)
         _, first = np.unique(np.sort(faces[there], axis=1), axis=0, return_index=True)
         return faces[there][np.sort(first)]
 
     def _parted(self, faces: Ids) -> tuple[Ints, NDArray[np.bool_]]:
-        """Return (n, k, 3) the triangles of each face, and whether all its triangles are outer faces of the mesh."""
+        """Return (n, k, 3) the triangles of each face. Also return flags: True if all triangles of the face are outer
+        faces of the mesh.
+        """
         if faces.shape[1] == 4:
             ways = [halves(faces).reshape(-1, 2, 3), _other_halves(faces)]
         else:
@@ -121,7 +125,9 @@ class Members:
         return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
 
     def _middle(self, one: Ids, other: Ids) -> Ids:
-        """Return (n,) the midside nodes between pairs of nodes; a node of the pair if there is no midside node."""
+        """Return (n,) the midside nodes between pairs of nodes. If there is no midside node, the result is one node of
+        the pair.
+        """
         low, high = np.minimum(one, other), np.maximum(one, other)
         every = np.concatenate([self._edges[:, :2], np.column_stack([low, high])])
         _, of = np.unique(every, axis=0, return_inverse=True)
@@ -133,8 +139,8 @@ class Members:
 
 
 def _other_halves(quads: Ids) -> Ids:
-    """Return (n, 2, 3) the two triangles of each quadrilateral for its other diagonal, because tets may have these
-    triangles as faces.
+    """Return (n, 2, 3) the two triangles of each quadrilateral for its other diagonal. Tets may have the triangles of
+    either diagonal as faces.
     """
     odd = (quads.argmin(axis=1) % 2 == 0)[:, None]
     rolled = np.where(odd, np.roll(quads, -1, axis=1), quads)

@@ -1,4 +1,6 @@
-"""Check of parts that share nodes of one file without a bond; such parts would separate at the shared nodes."""
+"""Check of parts that share nodes of one file without a bond. Parts without a bond would separate at the shared
+nodes.
+"""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -12,15 +14,15 @@ from conoid.cases.model.schema import Case
 from .model import Floats, Ids, Origin
 
 _SAME = 1e-9
-"""Distance, divided by the largest coordinate, below which two nodes coincide; chosen value: the round-off in files is
-a millionth."""
+"""Distance between two nodes, divided by the largest coordinate. Two nodes with a smaller distance count as coincident.
+Chosen value: the round-off in files is a millionth."""
 
 Placed = tuple[int, Origin, Floats]
-"""A part: its number, the origin of its mesh, and its nodes (n, 3), m, after its rotation."""
+"""Data of a part: its number, the origin of its mesh, and its nodes (n, 3), m, after its rotation."""
 
 
 def shared_nodes(case: Case, parts: Sequence[Placed]) -> Iterator[str]:
-    """Return an error for every two parts of different bodies that share coincident nodes of a file.
+    """Yield an error for every two parts of different bodies that share coincident nodes of a file.
 
     A tied bond between a rigid and a deformable part is allowed, because each of the two parts has its own copy of the
     nodes.

@@ -1,5 +1,5 @@
-"""Constraints that keep the shape of a body when nodes move. A node of a flat face stays in the face; a node of a round
-face stays on that face.
+"""Constraints that keep the shape of a body when nodes move. A node of a flat face remains in the face; a node of a
+round face remains on that face.
 """
 
 from dataclasses import dataclass
@@ -16,16 +16,16 @@ from .frame import block
 from .model import Floats, TetMesh
 
 _NEAR = 1e-9
-"""Largest distance between a node and a surface of the body, in units of ``scale``, at which the node counts as lying
-on the surface."""
+"""Largest distance between a node and a surface of the body at which the node counts as lying on the surface, in units
+of ``scale``."""
 
 
 @dataclass(frozen=True)
 class Skin:
     """Constraints on the nodes of a body.
 
-    ``held``: (n, 3), whether each coordinate of a node is fixed. ``radius``: (n,), fixed distance from the axis (from
-    the centre for a sphere), 0 for a free node. ``round``: number of coordinates a, b, c from which the radius is
+    ``held`` (n, 3): True for each coordinate of a node that is fixed. ``radius`` (n,): fixed distance from the axis
+    (from the centre for a sphere), 0 for a free node. ``round``: number of coordinates a, b, c from which the radius is
     computed.
     """
 
@@ -35,8 +35,8 @@ class Skin:
 
     @classmethod
     def of(cls, body: Generated, mesh: TetMesh, scale: float) -> tuple[Self, Floats]:
-        """Return the constraints of a ``mesh`` in the frame of the body, and the points of the mesh, projected onto the
-        surface of the body; lengths are divided by ``scale``.
+        """Return the constraints of a ``mesh`` in the frame of the body. Also return the points of the mesh, projected
+        onto the surface of the body. Lengths are divided by ``scale``.
         """
         points, round_in = mesh.points.copy(), 3 if isinstance(body, Sphere) else 2
         skin = np.zeros(len(points), bool)
@@ -53,7 +53,7 @@ class Skin:
         return cls(held, radius, round_in), points
 
     def movable(self, node: int) -> bool:
-        """Return whether ``node`` can move."""
+        """Return True if ``node`` can move."""
         return int(self.held[node].sum()) + int(self.radius[node] > 0) < 3
 
     def allowed(self, node: int, start: Floats, places: Floats) -> Floats:

@@ -8,8 +8,8 @@ from conoid.cases.shapes.geometry import across, bounds, index
 from .model import TetMesh
 
 _NEAR = 1e-6
-"""Distance between a node and the plane of a slit, divided by the element size, below which the node lies on the
-plane."""
+"""Distance between a node and the plane of a slit, divided by the element size. A node with a smaller distance lies on
+the plane."""
 
 
 def opened(body: Box | Plate, mesh: TetMesh) -> TetMesh:

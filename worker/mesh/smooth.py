@@ -1,4 +1,5 @@
-"""Smoothing of the tets that limit the time step. In an explicit run the worst tet limits every step.
+"""Smoothing of the tets that limit the time step. In an explicit run the tet with the shortest step length limits every
+step.
 
 The tets with the shortest step length are processed first. One node of a tet with a small step length is moved along
 the gradient of the step length, as far as the worst tet at the node improves. Nodes on the boundary slide along the
@@ -13,27 +14,27 @@ import numpy as np
 from .model import Floats, Ids, TetMesh, step_lengths
 
 _MOVES = np.array([0.6, 0.3, 0.15, 0.07, 0.03])
-"""Tried distances of the move of a node, divided by the step length of the worst tet."""
+"""Distances by which a node is moved in successive attempts, divided by the step length of the worst tet."""
 
 _GAIN = 1.01
-"""Smallest ratio of the new to the old step length of the worst tet at a node. A move with a smaller ratio is not
-made."""
+"""Smallest ratio of the new step length to the old step length of the worst tet at a node. A move with a smaller ratio
+is not made."""
 
 
 _MOST, _PATIENCE = 10_000, 4
-"""Limits of the number of processed tets: the total number, and the number for each tet whose initial step length is
+"""Two limits of the number of processed tets: a total number, and a number for each tet whose initial step length is
 too small."""
 
 _AHEAD = 1.25
-"""Largest ratio of the step length of a processed tet to that of a tet that cannot be improved; a tet above this ratio
-is not processed, because the tet that cannot be improved limits the time step."""
+"""Largest ratio of the step length of a processed tet to that of a tet that cannot be improved. A tet with a larger
+ratio is not processed, because the tet that cannot be improved limits the time step."""
 
 
 class Slides(Protocol):
     """Constraints on the nodes of a body, which keep its shape."""
 
     def movable(self, node: int) -> bool:
-        """Return whether ``node`` can move."""
+        """Return True if ``node`` can move."""
 
     def allowed(self, node: int, start: Floats, places: Floats) -> Floats:
         """Return the allowed positions (k, 3) of ``node`` nearest to ``places``; ``start`` is its present position."""
@@ -102,7 +103,9 @@ class _Smoothing:
         return slope
 
     def _lengths_at(self, node: int, tets: Ids, places: Floats) -> Floats:
-        """Return (k, s) step lengths of the s tets in ``tets``, for each of the k positions ``places`` of ``node``."""
+        """Return (k, s) step lengths of the s tets in ``tets``, one row for each of the k positions ``places`` of
+        ``node``.
+        """
         corners = np.repeat(self.points[self.tets[tets]][None], len(places), axis=0)
         corners[:, self.tets[tets] == node] = places[:, None]
         return step_lengths(corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(*corners.shape[:2], 4))

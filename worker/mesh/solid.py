@@ -14,7 +14,8 @@ from .second_order import Way
 from .sets import Named, members
 
 _SEEN = 1e-6
-"""Share of the volume below which no note is given; chosen value: the round-off of coordinates with six digits."""
+"""Change of the volume as a fraction of the volume. For a smaller change no note is given. Chosen value: the round-off
+of coordinates with six digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,22 +38,22 @@ class Content:
 
 @dataclass(frozen=True, eq=False)
 class _Tets:
-    """Tets, with the elements from which the tets were made."""
+    """Tets, and the elements from which these tets were made."""
 
     nodes: Ids
     numbers: Ids
     lines: Ids
     middles: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    """(j, 3) positions of the added nodes in the middle of elements; the indices of these nodes follow the indices of
-    the nodes of the file."""
+    """(j, 3) positions of the nodes that were added in the middle of elements. The indices of the added nodes follow
+    the indices of the nodes of the file."""
     of: Ids = field(default_factory=lambda: np.zeros(0, np.int64))
     """(j,) element of each added node."""
 
 
 def solid(content: Content, way: Way | None = None) -> NamedMesh:
-    """Return the mesh of all elements: positive tets with matching faces, not yet checked.
+    """Return the mesh of all elements: positive tets with matching faces. The mesh is not yet checked.
 
-    ``way``: treatment of a tet of ten nodes, which is cut into ``eight`` tets or becomes one tet of its ``corners``.
+    ``way``: treatment of a tet of ten nodes: it is cut into ``eight`` tets, or it becomes one tet of its ``corners``.
     Raises MeshError for an element that is inverted, flat or too distorted.
     """
     tets = [each for each in content.cells if each.kind.form is Form.TET]

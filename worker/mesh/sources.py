@@ -14,7 +14,8 @@ from conoid.cases.reading.problems import dotted
 from ..errors import MeshError
 
 Sources = Mapping[str, Path]
-"""Absolute paths of files, keyed by the table in the case that names the file, such as ``parts[0].mesh.of[1]``."""
+"""Dictionary of absolute paths of files. A key is the table in the case that names the file, such as
+``parts[0].mesh.of[1]``."""
 
 
 def sources(mesh: Mesh, folder: Path, key: str) -> dict[str, Path]:

@@ -30,7 +30,9 @@ def save(mesh: TetMesh, path: Path) -> None:
 
 
 def load(path: Path) -> TetMesh | None:
-    """Return the mesh in ``path``; None if the file is missing or damaged. Each array in the file has a checksum."""
+    """Return the mesh in ``path``; None if the file is missing or damaged. Damage is detected by the checksum of each
+    array in the file.
+    """
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             return TetMesh(arrays["points"], arrays["tets"], _origin(arrays), _sets(arrays))
@@ -53,7 +55,7 @@ def _origin(arrays: Mapping[str, NDArray[Any]]) -> Origin | None:
 
 
 def _of_sets(sets: tuple[NodeSet, ...]) -> dict[str, Any]:
-    """Return all sets as a few arrays. A set of nodes has -1 as its number of faces."""
+    """Return all sets as a few arrays. For a set of nodes the number of faces is -1."""
     if not sets:
         return {}
     faces = [_no_faces() if each.faces is None else each.faces for each in sets]

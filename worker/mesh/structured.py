@@ -1,8 +1,8 @@
 """Regular meshes for verification: hexahedra cut into 5 or 6 tets, in plain numpy.
 
-A block is cut into cells by planes. The cells of a solid cylinder are made by a square grid, mapped to the disk, and by
-planes across the axis. The cells of a tube are made by rings, sectors and planes. ``element_size`` is rounded to a
-whole number of divisions, at least one.
+A block is cut into cells by planes. The cells of a solid cylinder are made from a square grid, which is mapped to the
+disk, and from planes across the axis. The cells of a tube are made from rings, sectors and planes. ``element_size`` is
+rounded to a whole number of divisions, at least one.
 """
 
 import itertools
@@ -21,13 +21,15 @@ from .model import Floats, Ints, TetMesh
 from .slit import opened
 
 Cells = tuple[NDArray[np.int64], NDArray[np.int64]]
-"""Numbers of the near and the far node of each cell along one direction."""
+"""Numbers of the near node and the far node of each cell along one direction."""
 
 Lines = NDArray[np.int64]
 
 
 def structured(body: Generated, key: str = "mesh") -> TetMesh:
-    """Return the regular mesh of a body. Raises MeshError, naming ``key``; a sphere has no regular mesh."""
+    """Return the regular mesh of a body. Raises MeshError, whose message contains ``key``; a sphere has no regular
+    mesh.
+    """
     refuse_impossible(body, key)
     if body.grading is not None:
         raise MeshError(f"{key}.grading: the structured generator has one element size; remove it, or use gmsh")
@@ -49,7 +51,7 @@ def structured(body: Generated, key: str = "mesh") -> TetMesh:
 
 
 def divisions(length: float, size: float) -> int:
-    """Return the number of cells of about ``size`` along ``length``."""
+    """Return the number of cells of about the size ``size`` along ``length``."""
     return max(1, round(length / size))
 
 
@@ -115,8 +117,8 @@ def _plain(count: int) -> Cells:
 
 
 def _mirrored(line: Lines) -> Cells:
-    """Return the cells between successive nodes of ``line``, which is centred at 0. The near node of a cell is the one
-    closer to 0, so the two sides are mirror images.
+    """Return the cells between successive nodes of ``line``, which is centred at 0. The near node of a cell is the node
+    closer to 0. Therefore the two sides are mirror images.
     """
     low, high = np.arange(len(line) - 1), np.arange(1, len(line))
     inside = line[:-1] >= 0
@@ -148,7 +150,7 @@ def _cut(shape: list[int], cells: list[Cells], split: int) -> Ints:
 
 
 def _odd(numbers: list[Lines]) -> NDArray[np.bool_]:
-    """Return for each cell whether the sum of its three cell numbers (one for each direction) is odd."""
+    """Return flags of the cells: True if the sum of the three cell numbers (one for each direction) is odd."""
     a, b, c = np.ix_(*numbers)
     return np.asarray((a + b + c) % 2 == 1).ravel()
 

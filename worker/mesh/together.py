@@ -48,7 +48,7 @@ class _Model:
 
     gmsh: Any
     bodies: Mapping[str, Joint]
-    """Bodies, keyed by the keys of their meshes in the case."""
+    """Bodies; the keys are the keys of their meshes in the case."""
     frame: Frame
     """Frame of all bodies: the directions x, y, z from the origin."""
     volumes: Sequence[Sequence[int]]
@@ -56,10 +56,11 @@ class _Model:
 
 
 def together(bodies: Mapping[str, Joint], sources: Sources, name: str) -> list[TetMesh]:
-    """Return the meshes of ``bodies``, keyed by the keys of their meshes. All meshes use one numbering of nodes.
+    """Return the meshes of ``bodies``, as a dictionary with the keys of the meshes in the case. All meshes use one
+    numbering of nodes.
 
-    ``name``: file name that the origin of each mesh gets. Raises MeshError, naming a key, if gmsh cannot make the
-    meshes.
+    ``name``: file name that the origin of each mesh gets. Raises MeshError, whose message contains a key, if gmsh
+    cannot make the meshes.
     """
     for key, body in bodies.items():
         if not isinstance(body, _Solid):
@@ -155,7 +156,7 @@ def _size(gmsh: Any, body: Joint, frame: Frame, volumes: Sequence[int]) -> int:
 
 
 def _part(model: _Model, sources: Sources, made: TetMesh, names: Names, k: int, name: str) -> TetMesh:
-    """Return the mesh of body ``k``, selected from the tets ``made`` of all bodies; ``names``: numbers that gmsh gives
+    """Return the mesh of body ``k``, selected from the tets ``made`` of all bodies. ``names``: numbers that gmsh gives
     to nodes and tets.
     """
     elements = [model.gmsh.model.mesh.getElements(3, tag)[1] for tag in model.volumes[k]]

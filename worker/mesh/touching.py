@@ -15,8 +15,8 @@ from .faces import normals
 from .model import Floats, Ids, Ints
 
 _MOST = 20_000
-"""Largest number of faces that are tested against the surface of a generated body. The faces are inside of its bounding
-box; with the chosen value the test takes half a second."""
+"""Largest number of faces that are tested against the surface of a generated body. Only faces inside of the bounding
+box of the body are tested. Chosen value: the test takes half a second."""
 
 Surface = tuple[Floats, Ints]
 """Surface of a part: its nodes (n, 3), m, and its faces (k, 3) with outward normals."""
@@ -25,8 +25,8 @@ Surface = tuple[Floats, Ints]
 def touches(case: Case, surfaces: Mapping[int, Surface]) -> Iterator[Touch]:
     """Yield the pairs of parts that touch without a bond. At least one part of a pair has a mesh from a file.
 
-    ``surfaces``: surfaces of the parts, keyed by part. Two meshes from files touch in faces with equal corners. A mesh
-    from a file touches a generated body in faces that lie on the surface of the body.
+    ``surfaces``: dictionary from part numbers to surfaces. Two meshes from files touch in faces with equal corners. A
+    mesh from a file touches a generated body in faces that lie on the surface of the body.
     """
     for (i, one), (j, other) in combinations(surfaces.items(), 2):
         if not bonded(case, i, j) and (area := _matched(one, other)):

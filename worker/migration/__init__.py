@@ -1,3 +1,3 @@
-"""The complete state of a run, keyed by global ids. A parcel (part of the state) is sent between ranks or written to
-disk, and is read on any number of ranks.
+"""The complete state of a run by global ids. A parcel is a part of the state that is sent between ranks or written to
+disk. A parcel can be read on any number of ranks.
 """

@@ -1,9 +1,10 @@
-"""Load balance: costs of tets, the decision to divide the tets again among the ranks (a cut), and the time that cuts
-have saved.
+"""Load balance. The module measures the costs of tets, decides when to divide the tets again among the ranks (a cut),
+and computes the time that cuts have saved.
 
 Costs are CPU seconds of this run. The cost of the tets of each part is measured in the passes over these tets. The cost
 of nodes, and the cost of contact for the candidate pairs of a node, are also measured. Every rank receives the times of
-all ranks, so that all ranks make the same decision. The answer of the run does not depend on this decision.
+all ranks, so that all ranks make the same decision. The answer of the run does not depend on the division of the tets
+among the ranks.
 """
 
 import time
@@ -27,20 +28,20 @@ from .parcel import Parcel
 from .route import route
 
 _LEAST = 1e-9
-"""Smallest cost of a tet, s; with this value every rank gets tets even before any cost is measured. The chosen value is
-far below the measured cost of any tet."""
+"""Smallest cost of a tet, s; with this cost, every rank gets tets even before any cost is measured. Chosen value: far
+below the measured cost of any tet."""
 
 
 @dataclass
 class Window:
-    """CPU seconds of all ranks in some steps."""
+    """CPU seconds of all ranks, in some successive steps."""
 
     steps: int
     work: dict[str, list[float]]
-    """CPU seconds, keyed by phase; one number for each rank."""
+    """CPU seconds in each phase, with one number for each rank."""
 
     def loads(self, phases: tuple[str, ...]) -> list[float]:
-        """Return (ranks,) the load of each rank in the given phases, s per step."""
+        """Return (ranks,) the load of each rank in the given phases, in s per step."""
         return [float(load) / max(self.steps, 1) for load in np.sum([self.work[name] for name in phases], axis=0)]
 
     @property
@@ -57,13 +58,13 @@ class Balance:
     comm: Comm
     trigger: Trigger
     _meter: Meter
-    """Meter of the costs since the last cut; it is restarted when half of the loss that triggers the next cut has
-    accumulated, because costs change as fronts move."""
+    """Meter of the costs since the last cut. The meter is restarted when half of the loss that triggers the next cut
+    has accumulated, because costs change as fronts move."""
     spent: float = 0.0
     """Wall time of all cuts, s."""
     events: int = 0
     _half: bool = False
-    """Whether the meter was restarted since the last cut."""
+    """True if the meter was restarted since the last cut."""
     _guard: Guard | None = None
     _latest: Window | None = None
     _before: float | None = None
@@ -73,12 +74,14 @@ class Balance:
 
     @classmethod
     def of(cls, sim: Simulation) -> Self:
-        """Return the balance of a run that starts or resumes."""
+        """Return the balance of a run that starts or is resumed."""
         trigger = Trigger(sim.case.balance, sim.assembled, sim.clock.step)
         return cls(sim.case, sim.comm, trigger, Meter.of(sim))
 
     def look(self, window: Window) -> None:
-        """Add the times of all ranks since the last call. Time that no cut can move to another rank is omitted."""
+        """Add the times of all ranks since the last call. The time of work that no cut can move to another rank is
+        omitted.
+        """
         self._latest = window
         self.trigger.look(window.loads(MOVED), window.steps)
 
@@ -86,8 +89,8 @@ class Balance:
     def saved(self) -> float:
         """Time saved by all cuts so far, s.
 
-        For each cut the time is compared for two imbalances: just before and just after the cut. Imbalance that arises
-        later is not counted.
+        For each cut the times of two imbalances are compared: the imbalance just before the cut, and the imbalance just
+        after it. Imbalance that arises later is not counted.
         """
         stretch = self.trigger.stretch
         if self._before is None or not stretch.steps:
@@ -95,7 +98,7 @@ class Balance:
         return self._saved + (self._before - stretch.halves[0]) * float(np.mean(stretch.work))
 
     def grown(self, sim: Simulation) -> bool:
-        """Return whether this rank has more outside nodes than its limit."""
+        """Return True if this rank has more outside nodes than its limit."""
         if self.case.balance.policy != "outside" or sim.contact is None:
             return False
         self._guard = self._guard or Guard(self.case.balance.alpha)
@@ -111,7 +114,8 @@ class Balance:
         return cause
 
     def move(self, sim: Simulation) -> tuple[Simulation, dict[str, Any]]:
-        """Make a cut by the costs and move the tets. Return the new simulation and the fields of the message.
+        """Make a cut by the costs, and move the tets. Return the new simulation and the fields of the message about the
+        cut.
 
         Collective.
         """
@@ -133,8 +137,8 @@ class Balance:
         return now, message
 
     def _settle(self, sim: Simulation, cost: float, work: float) -> None:
-        """Restart the measurement after a cut. ``cost``: wall time of the cut, s; ``work``: CPU time of the cut on the
-        slowest rank, s.
+        """Restart the measurement after a cut. ``cost``: wall time of the cut, s; ``work``: CPU time that the slowest
+        rank used for the cut, s.
         """
         paid = self._before is None or self.saved - self._saved >= self.trigger.cost
         self.events, self.spent, self._saved = self.events + 1, self.spent + cost, self.saved

@@ -44,7 +44,7 @@ from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
 _KEPT = 2
-"""Number of checkpoints that are kept; chosen value: one more than the latest checkpoint, which may be damaged."""
+"""Number of checkpoints that are kept. Chosen value: one more than the latest checkpoint, which may be damaged."""
 _FREE = {
     "run": {
         "ranks", "threads", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit",
@@ -56,7 +56,7 @@ _FREE = {
 
 
 def write(parcel: Parcel, case: Case, folder: Path, step: int, t: float, comm: Comm) -> tuple[Path, int]:
-    """Write a checkpoint of the run in ``folder``. Return the folder of the checkpoint and its number of bytes.
+    """Write a checkpoint of the run to ``folder``. Return the folder of the checkpoint and its number of bytes.
 
     Collective.
     """
@@ -104,7 +104,7 @@ def forget(folder: Path, step: int = -1) -> None:
 
 
 def latest(folder: Path) -> tuple[Path, Manifest, list[str]]:
-    """Return the latest complete checkpoint and its manifest. Return also a message for each later checkpoint, because
+    """Return the latest complete checkpoint and its manifest. Also return a message for each later checkpoint, because
     such a checkpoint is damaged.
 
     Raises InputError if no checkpoint is complete.
@@ -136,7 +136,9 @@ def require_same(case: Case, manifest: Manifest) -> None:
 
 
 def _differences(now: Any, then: Any, location: Location) -> Iterator[tuple[Location, object, object]]:
-    """Yield the location and the two values of each key that differs; the value of a missing key is Ellipsis."""
+    """Yield the location and the two values of each key that differs between two cases. The value of a missing key is
+    Ellipsis.
+    """
     if isinstance(now, dict) and isinstance(then, dict):
         for key in sorted({*now, *then}):
             yield from _differences(now.get(key, ...), then.get(key, ...), (*location, key))
@@ -203,8 +205,8 @@ def _columns(group: "h5py.Group") -> Table:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value that JSON can represent. The representation of an array contains its type and its shape, because
-    the list of an array without values lacks dimensions.
+    """Return a value that JSON can represent. The representation of an array contains its type and its shape, because a
+    list of no values does not show the dimensions.
     """
     if isinstance(value, np.ndarray):
         return {"dtype": str(value.dtype), "values": value.tolist(), "shape": list(value.shape)}
@@ -216,7 +218,7 @@ def _plain(value: Any) -> Any:
 
 
 def _rich(value: Any) -> Any:
-    """Return the value from which ``_plain`` made its result. Lists become tuples."""
+    """Return the value that ``_plain`` converted. Lists become tuples."""
     if isinstance(value, dict):
         if value.keys() >= {"dtype", "values"}:
             made = np.array(value["values"], value["dtype"])

@@ -1,10 +1,10 @@
 """Loads of groups of tets, recorded at intervals. From the records the effect of other balance policies can be
 computed.
 
-``conoid replay-balance`` reads the records (docs/performance/balance.md); a group is a fixed set of tets, cut at the
-start, with a set of nodes and their copies; when tets and nodes move between ranks, they stay in their group. Counts
-are integers and equal for any number of ranks; an exception are candidate pairs of edges and cracks whose nodes are on
-several ranks.
+``conoid replay-balance`` reads the records (docs/performance/balance.md). A group is a fixed set of tets, chosen at the
+start, with their nodes and the copies of these nodes. When tets and nodes move between ranks, the tets and nodes remain
+in their group. Counts are integers and equal for any number of ranks; an exception are candidate pairs of edges and
+cracks whose nodes are on several ranks.
 """
 
 import time
@@ -17,11 +17,11 @@ from ..simulation import Simulation
 from .meter import Meter
 
 _TIMES = 200
-"""Largest number of records of a run. A slow run has more records: one for each interval ``_PATIENCE``."""
+"""Largest number of records of a normal run. A slow run has more records: one in each interval ``_PATIENCE``."""
 _PATIENCE = 10.0
 """Largest wall time between two records, s. Chosen value."""
 _SHARE = 1.0 / 400.0
-"""Fraction of the time of a run that records may take."""
+"""Fraction of the time of a run that the recording may take."""
 
 
 class Groups:
@@ -34,22 +34,22 @@ class Groups:
         self._t = sim.clock.t
         self._recorded = time.monotonic()
         self._took = 0.0
-        """CPU time of the last record, s."""
+        """CPU time that the last record took, s."""
         self._first = True
 
     def moved(self, sim: Simulation) -> None:
-        """Restart the meter after tets have moved, because the time of a block then counts from zero."""
+        """Restart the meter after tets have moved, because the time of each block then starts from zero."""
         self._meter = Meter.of(sim)
 
     def due(self, t: float, now: float) -> bool:
-        """Return whether a record is scheduled at the simulated time ``t`` and the wall time ``now``; only rank 0 calls
-        this method.
+        """Return True if a record is scheduled. ``t``: simulated time, s; ``now``: wall time, s. Only rank 0 calls this
+        method.
         """
         since = now - self._recorded
         return since * _SHARE > self._took and (t >= self._t or since > _PATIENCE)
 
     def record(self, sim: Simulation) -> dict[str, Any]:
-        """Return the fields of the message of a record. Collective."""
+        """Return the fields of the message for one record. Collective."""
         began, model = worked(sim.comm), sim.model
         n, end = len(model.groups), sim.case.run.end_time
         counts = np.zeros((n, len(model.parts) + 2), np.int64)

@@ -11,8 +11,8 @@ from ..model.state import Floats
 from ..simulation import Simulation
 
 _FARTHEST = 4.0
-"""Largest ratio of the cost of a candidate pair on one rank to the mean cost, and of the mean cost to the cost on one
-rank; chosen value: with few candidate pairs the measurement is mostly noise."""
+"""Bound for two ratios: cost of a candidate pair on one rank to the mean cost, and the inverse of this ratio. Chosen
+value: with few candidate pairs the measurement is mostly noise."""
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,8 @@ class Costs:
     tet: Floats
     """(parts,) cost of a tet of each part."""
     candidate: float
-    """Cost of a contact candidate on this rank; it is measured on this rank, because the candidates of different ranks
-    have different costs."""
+    """Cost of a contact candidate on this rank. The cost is measured on each rank, because the candidates of different
+    ranks have different costs."""
     fracture: float
     """Cost of the fracture stage on this rank."""
     rank: float
@@ -42,7 +42,7 @@ class Meter:
 
     @classmethod
     def of(cls, sim: Simulation) -> Self:
-        """Return a meter that measures from now on."""
+        """Return a meter that starts to measure now."""
         return cls(sim.clock.step, dict(sim.timers.seconds), on_parts(sim))
 
     def costs(self, sim: Simulation, effort: float) -> Costs:
@@ -71,8 +71,8 @@ def _candidates(had: Floats, took: Floats) -> Floats:
 
 
 def on_parts(sim: Simulation) -> Floats:
-    """Return (parts,) the CPU time of the passes over the tets of each part so far, s. If the rank has one block, the
-    time of its part is the time of the phase.
+    """Return (parts,) the CPU time of the passes over the tets of each part so far, s. If the rank has only one block,
+    the time of its part is the time of the phase of the elements.
     """
     seconds, blocks = np.zeros(len(sim.model.parts)), sim.model.blocks
     for block in blocks:

@@ -1,5 +1,5 @@
-"""Redistribution of the state: all tets are divided again (a cut), parcels are sent from rank to rank, and the holders
-and owners of nodes are found.
+"""Redistribution of the state. All tets are divided again (a cut), parcels are sent from rank to rank, and the ranks
+that have or own each node are found.
 
 A box of the cut is assigned to the rank that already has most of its tets. The nodes of a tet are sent with the tet. A
 distributed directory finds the ranks that share a node: the rank with the number id % ranks receives the list of ranks
@@ -19,7 +19,7 @@ from ..parallel.ownership import Neighbour
 from .parcel import Parcel, Table, joined, length, once, take
 
 _NO_TET = np.iinfo(np.int64).max
-"""Value for the smallest tet id at a node, on a rank that has no tet at the node."""
+"""Value that replaces the smallest tet id at a node, on a rank that has no tet at the node."""
 
 
 @dataclass
@@ -55,14 +55,14 @@ class Arrived:
     owner: Indices
     """(nodes,) rank that owns each node of the parcel."""
     border: Flags
-    """(nodes,) whether other ranks also have the node."""
+    """(nodes,) True if other ranks also have the node."""
     neighbours: list[Neighbour]
     moved: tuple[int, int]
     """Numbers of tets and nodes that this rank received from other ranks."""
 
 
 def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arrived:
-    """Cut all tets by their ``weight`` (n, 3) (Balance.weigh), and send all data to the new ranks.
+    """Divide all tets among the ranks by their ``weight`` (n, 3) (Balance.weigh), and send all data to the new ranks.
 
     Collective. Before the cut, positions are multiplied by ``scale``.
     """
@@ -99,7 +99,7 @@ def _one_of_each(name: str, rows: Table) -> Table:
 
 
 def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices], list[Cut]]:
-    """Return the box of the cut in which each tet is, for each part. Return also the cuts. Collective."""
+    """Return for each part the box of the cut in which each tet is. Also return the cuts. Collective."""
     nodes, points, ids, weights = parcel.nodes, [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros((0, 3))]
     for table in parcel.tets.values():
         corners = located(nodes["id"], table["corners"])
@@ -131,8 +131,8 @@ def _homes(places: dict[int, Indices], comm: Comm) -> Indices:
 def _share(
     parcel: Parcel, targets: dict[int, Indices], boxes: tuple[list[Cut], Indices], rank: int, scale: Floats
 ) -> Parcel:  # fmt: skip
-    """Return the data for ``rank``, without tables that go to owners of nodes. ``boxes``: the cuts, and the rank of
-    each box.
+    """Return the data for ``rank``, without the tables that are sent to the owners of nodes. ``boxes``: the cuts, and
+    the rank of each box.
     """
     cuts, home = boxes
     tets = {part: take(table, targets[part] == rank) for part, table in parcel.tets.items()}
@@ -191,8 +191,8 @@ def _settle(whole: Parcel, comm: Comm) -> tuple[Directory, list[Neighbour], Indi
 
 
 def _sharing(every: Ints, group: Ints, owners: Ints, rank: int) -> Ints:
-    """Return (k, 3) node, other rank and owner, for each node that ``rank`` shares with another rank; ``group``: node
-    of each row.
+    """Return (k, 3) node, other rank and owner, for each node that ``rank`` shares with another rank; ``group``: number
+    of the node of each row.
     """
     held = np.zeros(len(owners), bool)
     held[group[every[:, 2] == rank]] = True

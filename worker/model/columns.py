@@ -28,7 +28,7 @@ class Rule(IntFlag):
 ZERO, ABSENT, COPIED = Rule.ZERO, Rule.ABSENT, Rule.COPIED
 _WORDS, _ALL_BITS = 5, 255
 """Number of words that describe a column to the kernels: address, number of bytes, bytes of a row, value of each byte
-of a new row, and flag for copied rows. The second constant is the value of a byte in which all bits are set."""
+of a new row, and flag for copied rows; and value of a byte in which all bits are set."""
 
 
 class _Columns:
@@ -98,8 +98,8 @@ class Columns:
         fill(self._words, address_of(self._words), n, more)
 
     def copy(self, sources: "npt.NDArray[Any]", targets: "npt.NDArray[Any]") -> None:
-        """Copies the rows ``sources`` (k,) to the rows ``targets`` (k,) in the columns with the rule COPIED. Both
-        arrays are int64.
+        """Copies the rows ``sources`` (k,) to the rows ``targets`` (k,) in the columns with the rule COPIED. The arrays
+        ``sources`` and ``targets`` are int64.
         """
         from .inheriting import copy
 

@@ -5,7 +5,7 @@ from ..parallel.arguments import reader
 
 _WIDTH, _VALUE, _IS_COPIED, _SIZE = 2, 3, 4, 40
 """Indices of the words that describe a column (columns.py): bytes of a row, value of each byte of a new row, and flag
-for copied rows. The last constant is the number of bytes of all words of a column."""
+for copied rows; and number of bytes of all words of a column."""
 _bytes = reader(types.uint8[::1])
 
 

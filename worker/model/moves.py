@@ -19,7 +19,7 @@ class Moves(NamedTuple):
     holes: _Ints
     """(k,) free places that are filled by other tets."""
     movers: _Ints
-    """(k,) old places of the tets that fill these places."""
+    """(k,) old places of the tets that move to the free places."""
 
     @classmethod
     def of(cls, n: int, gone: _Ints) -> "Moves":

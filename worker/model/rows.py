@@ -22,7 +22,7 @@ VOLUME_FLUX = 12
 """Rate of change of the volume at mid-step, m^3/s (only averaged pressure forms have this row)."""
 TET_VOLUME = 12
 """Volume at the end of the last pass over the elements, m^3 (only materials without a strength law have this row). The
-first pass, with a time step of zero, sets this volume."""
+first pass over the elements, with a time step of zero, sets the initial volume."""
 WORK_AVERAGED = 13
 """Difference between the work of the pressure on the tet and its work on the averaged volume, J; the row WORK contains
 the difference, too (only averaged pressure forms; elements/mean.py)."""
@@ -33,9 +33,10 @@ PLASTIC_STRAIN = 15
 WORK_PLASTIC = 16
 """Plastic work since the start, J."""
 YIELD = 17
-"""Flow stress at vanishing strain rate, Pa. Plastic flow begins at this stress."""
+"""Flow stress at vanishing strain rate, Pa. Plastic flow begins at the flow stress."""
 FLOW = 18
-"""Flow stress of the last plastic step, Pa. The iteration of the next plastic step starts with this value."""
+"""Flow stress of the last plastic step, Pa. The iteration of the next plastic step starts with the flow stress of the
+last plastic step."""
 BULKING = 18
 """Bulking pressure, Pa (Johnson-Holmquist)."""
 DILATION = 18
@@ -47,7 +48,7 @@ DAMAGE = 20
 """Damage, from 0 (intact) to 1 (failed); only material laws with damage have this row."""
 PORES = 21
 """Volume of the pores opened by a tension cut-off, divided by the volume of the solid matter. If the equation of state
-is linear, the row has the logarithm of 1 + this ratio."""
+is linear, the row PORES has the logarithm of 1 + the ratio of pores to solid matter."""
 HEAT = 22
 """Energy from which the pressure of a tet is computed, divided by the initial bulk modulus, m^3. The energy of a flat
 tet is its own energy; that of another tet is a mean over its nodes. The row exists in averaged pressure forms if the
@@ -57,7 +58,7 @@ BULKING_STEP = 22
 forms)."""
 CORNERS = 23
 """Index of the first of four rows, one for each node of a tet: ratio of the current to the initial volume at this node.
-The pressure at the node is computed from this ratio (Johnson-Holmquist, averaged pressure forms)."""
+The pressure at the node is computed from the volume ratio at the node (Johnson-Holmquist, averaged pressure forms)."""
 NODAL_WORK = 23
 """Work on the tet that is already included in the nodal mean of HEAT, J."""
 WORKS = WORK, WORK_VISCOUS, WORK_PLASTIC, WORK_AVERAGED

@@ -1,5 +1,5 @@
-"""Nodes with tets of several parts, and the mass of each part in such a node. Bonds by shared nodes create these
-nodes.
+"""Nodes with tets of several parts, and the mass of each part in such a node. Bonds by shared nodes create nodes with
+tets of several parts.
 """
 
 from dataclasses import dataclass, field
@@ -31,7 +31,7 @@ class Shares:
     """(k,) mass that the node has from the tets of the part, kg."""
     rank: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     """(parts,) precedence of the parts as numbers, the smallest first; (0,) if no bond makes nodes of several parts.
-    Contact and other stages assign a node to one part only, its representative part. This is the part of the node with
+    Contact and other stages assign a node to one part only, its representative part, which is the part of the node with
     the smallest precedence number."""
 
     @property
@@ -52,8 +52,8 @@ class Shares:
     def members(self, part: Indices) -> tuple[Ints, Indices]:
         """Return (m,) nodes and (m,) their parts.
 
-        The first entries are all nodes with their representative ``part`` (n,). Then follows one entry for each other
-        part of a node with several parts.
+        The entries begin with all nodes and their representative ``part`` (n,). One entry follows for each other part
+        of a node with several parts.
         """
         more = self.part != part[self.node]
         return np.concatenate([np.arange(len(part)), self.node[more]]), np.concatenate([part, self.part[more]])

@@ -1,9 +1,8 @@
 """Arrays of a rank: nodes, and blocks of elements in chunks.
 
-A block contains the elements of one part. The state of the tets is stored chunk by chunk, ``(chunks, rows, CHUNK)``:
-the rows of a chunk are contiguous, at offsets known at compile time, so that loops over a chunk use vector instructions
-and the whole state of a chunk fits in the first cache levels. All values are in SI units. Stress is positive in
-tension, pressure is positive in compression.
+A block contains the elements of one part. The state is stored chunk by chunk, ``(chunks, rows, CHUNK)``: the rows of a
+chunk are contiguous, at fixed offsets, so that loops over a chunk use vector instructions and the whole state of a
+chunk fits in the first cache levels. Values are in SI units; stress is positive in tension, pressure in compression.
 """
 
 from dataclasses import dataclass, field
@@ -62,11 +61,9 @@ class Nodes:
     scale: float = 1.0
     """Number of quanta per newton in ``force``."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
-    """(n,) group of tets to which each node belongs (Model.groups); (0,) if loads of groups are not recorded. A copy of
-    a node has the group of its parent."""
+    """(n,) group (Model.groups) of each node or of its parent; (0,) if loads of groups are not recorded."""
     marks: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(n,) sets of mesh files that contain each node, one bit for each set (scene/marks.py); (0,) if the case refers to
-    no set. A copy of a node is in the same sets as its parent."""
+    """(n,) sets that contain each node or its parent, as bits (scene/marks.py); (0,) if the case uses no set."""
     shares: Shares = field(default_factory=Shares)
     """Masses of the parts in the nodes that belong to several parts."""
     columns: Columns = field(default_factory=Columns, init=False, repr=False, compare=False)
@@ -167,7 +164,7 @@ class Block:
     """Material constants (materials/models.py)."""
     border_chunks: int = 0
     temperature: float = 293.15
-    """Initial temperature, K. It is the temperature of every tet if the material has no row for the temperature."""
+    """Initial temperature, K; the temperature of every tet if the material has no row for the temperature."""
     across: Indices = field(default_factory=lambda: np.zeros((0, 4), np.int32))
     """(n, 4) the neighbour of each face at the start, 4 * global tet id + local face; the value is -1 for a face
     exposed at the start, and LAID_BARE for a face exposed by erosion. (0, 4) in scenes without contact and fracture."""
@@ -176,8 +173,7 @@ class Block:
     weakest: Floats = field(default_factory=lambda: np.zeros(0))
     """(n,) smallest strength of the four faces of each tet, Pa; (0,) if the part does not fracture."""
     hot: Bits = field(default_factory=lambda: np.zeros(0, np.uint8))
-    """(n,) marks of overstressed faces: bit k is set if the traction on face k, from the stress of the tet alone,
-    exceeds ``weakest``."""
+    """(n,) overstressed faces: bit k is set if the traction on face k (stress of the tet) is above ``weakest``."""
     flat: Flags = field(default_factory=lambda: np.zeros(0, bool))
     """(n,) True for each flat tet, whose strains are not averaged (elements/flat.py); (0,) if no tet is flat."""
     shear_weight: float = 0.0
@@ -189,8 +185,7 @@ class Block:
     rigid: bool = False
     """True if the part is rigid. Passes over elements omit a rigid part."""
     seconds: float = 0.0
-    """Time of the passes over the block, s: CPU time, or wall time if the rank has no neighbours. The time is measured
-    only if the rank has several blocks."""
+    """Time of the passes over the block, s, if the rank has several blocks: CPU time; wall time on a single rank."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(n,) group of each tet (Model.groups); (0,) if loads of groups are not recorded."""
     moved: int = 0
@@ -277,7 +272,7 @@ class Model:
 
 
 def chunked(values: Floats) -> Floats:
-    """Return (n,) values in the shape (chunks, CHUNK). The last value fills the rest of the last chunk."""
+    """Return (n,) values in the shape (chunks, CHUNK). The last element fills the rest of the last chunk."""
     chunks = -(-len(values) // CHUNK)
     filled = np.empty(chunks * CHUNK)
     filled[: len(values)] = values

@@ -28,10 +28,10 @@ from ..simulation import Simulation
 from ..snapshots.table import by_size
 
 SHARE = 1.0 / 50.0
-"""Fraction of the wall time that the search for fragments between frames may take; chosen value: a run of a minute
+"""Fraction of the wall time that the search for fragments between frames may take. Chosen value: a run of a minute
 takes one second longer."""
 _TETS = 4096
-"""Number of tets in a task; chosen value: a task takes some 20 us."""
+"""Number of tets in a task. Chosen value: a task takes about 20 us."""
 _MEASURE = (
     types.int64[::1], types.float64[:, ::1], types.int64[::1], types.int64[::1], types.uint32[:, ::1],
     types.float64[:, ::1],
@@ -40,23 +40,23 @@ _read_measure = reader(*_MEASURE)
 
 
 class Counter:
-    """The counts of a run. Every method is collective except ``due``."""
+    """Counts of a run. Every method is collective except ``due``."""
 
     def __init__(self) -> None:
-        """Start with no count."""
+        """Create an object without counts."""
         self._sent: tuple[object, ...] = ()
         self._found: tuple[int, int] = (-1, -1)
         """Number of broken facets and number of tets at the last search for fragments."""
         self._step = -1
         """Number of the step of the last search for fragments."""
         self._again = -math.inf
-        """Wall time from which on fragments may be searched again, as time.monotonic(), s."""
+        """Wall time after which fragments may be searched for again, s, on the clock time.monotonic()."""
         self._fragments, self._smallest, self._sizes = 0, 0, list[int]()
 
     def due(self, sim: Simulation, now: float, *, ending: bool) -> bool:
         """Return whether fragments must be searched; only rank 0 calls this method.
 
-        ``ending``: whether this is the last report.
+        ``ending``: True if this is the last report.
         """
         return _changing(sim) and _state(sim) != self._found and (ending or now >= self._again)
 
@@ -123,14 +123,14 @@ def of_bodies(sim: Simulation) -> list[Ints]:
 
 
 def _connected(sim: Simulation) -> bool:
-    """Return whether the neighbours of the tets are stored (``Block.across``); fragments are found by the
+    """Return True if the neighbours of the tets are stored (``Block.across``); fragments are found by the
     neighbours.
     """
     return sim.record is not None or sim.contact is not None
 
 
 def _changing(sim: Simulation) -> bool:
-    """Return whether the number of fragments can change."""
+    """Return True if the number of fragments can change."""
     return _connected(sim) and (sim.fracture is not None or sim.erosion is not None)
 
 
@@ -157,7 +157,7 @@ def sizes(model: Model, labels: list[Ints], comm: Comm, threads: Team) -> tuple[
 
 
 def _merged(labels: Ints, bounds: Floats) -> tuple[Ints, Floats]:
-    """Return the distinct labels, and for each label the bounds (g, 6), which are the maxima of the rows with this
+    """Return the distinct labels. Also return the bounds of each label, (g, 6), which are the maxima of the rows of the
     label.
     """
     here = unique(labels)

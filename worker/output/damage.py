@@ -1,8 +1,8 @@
 """Damage of tets for frames: 0 intact, 1 failed.
 
-The damage of a tet is the largest of three values; the first is the damage of the material law. The second is the
-dissipated fraction of the fracture energy in the most damaged cohesive facet of the tet (1 for a facet that has
-failed). The third is the plastic strain of the tet divided by its erosion strain.
+The damage of a tet is the largest of three values: the damage of the material law; the dissipated fraction of the
+fracture energy in the most damaged cohesive facet of the tet (1 for a facet that has failed); and the plastic strain of
+the tet divided by its erosion strain.
 """
 
 import numpy as np

@@ -1,7 +1,8 @@
 """Fields of frames that a case requests (``run.fields``): density, strain, strain rate, contact pressure.
 
-The first three fields are computed from positions and velocities. The contact pressure is computed from the impulses of
-contact since the previous frame. Each value depends on its tet or node only, not on ranks or on the order of tets.
+Density, strain and strain rate are computed from positions and velocities. The contact pressure is computed from the
+impulses of contact since the previous frame. Each value depends on its tet or node only, not on ranks or on the order
+of tets.
 """
 
 from collections.abc import Mapping
@@ -19,24 +20,24 @@ _ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 
 
 _FACING = 0.5
-"""Smallest cosine of the angle between an impulse and the inward normal of a face on which the impulse acts. The
-value was chosen between two cases: impulses with friction up to a coefficient of 1.7 on a flat face have a larger
-cosine, and the sides of an edge of 90 degrees have a smaller cosine up to a coefficient of 0.6."""
+"""Smallest cosine of the angle between an impulse and the inward normal of a face on which it acts. The value is a
+choice between two cases: on a flat face the cosine is larger up to a coefficient of friction of 1.7; on the sides of an
+edge of 90 degrees the cosine is smaller up to a coefficient of 0.6."""
 
 
 class Wanted(NamedTuple):
-    """The fields that a case requests for a frame, and the data from which they are computed."""
+    """Fields that a case requests for a frame, and the data from which they are computed."""
 
     names: tuple[str, ...] = ()
     """Names of the fields (``cases.schema.FrameField``)."""
     impulses: Floats | None = None
     """(nodes, 3) impulses of contact and walls on each node since the previous frame, N s."""
     passed: float = 0.0
-    """Time since the previous frame, s; 0 for the first frame."""
+    """Simulated time since the previous frame, s; 0 for the first frame."""
     walls: Floats | None = None
     """(walls, 3) present position of ``point`` of each wall of the case, m; None if no wall moves."""
     sets: Mapping[str, int] = MappingProxyType({})
-    """Bits of the sets in ``Nodes.marks``, keyed by the name of the array of the set."""
+    """Dictionary from the name of the array of each set to the bit of the set in ``Nodes.marks``."""
 
 
 def of_tets(names: tuple[str, ...], block: Block, nodes: Nodes) -> dict[str, Floats]:
@@ -93,8 +94,8 @@ def contact_pressure(x: Floats, tets: Ints, impulses: Floats, passed: float) -> 
 
 
 def _edges(values: Floats, block: Block) -> Floats:
-    """Return (n, 3, 3) three vectors for each tet: nodal values (nodes, 3) of its nodes 1, 2, 3 less that of its node
-    0. The vectors are rows.
+    """Return (n, 3, 3) three vectors for each tet, as rows: the nodal values (nodes, 3) of its nodes 1, 2, 3, minus the
+    value of its node 0.
     """
     corners = values[block.tets]
     return np.asarray(corners[:, 1:] - corners[:, :1])

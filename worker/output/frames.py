@@ -98,8 +98,8 @@ def _share(
 def _by_block(
     model: Model, labels: list[Ints] | None, damage: list[Floats] | None
 ) -> Iterator[tuple[Block, Ints, Floats]]:  # fmt: skip
-    """Yield each block with the fragments and the damage of its tets. For a rank without tets an empty block is
-    yielded, so that every rank has all columns.
+    """Yield each block with the fragments and the damage of its tets. A rank without tets yields an empty block, so
+    that every rank has all columns.
     """
     none: tuple[Ints, Floats] = np.zeros(0, np.int64), np.zeros(0)
     if not model.blocks:
@@ -180,8 +180,8 @@ def _by_id(pieces: list[dict[str, Any]], name: str, total: int) -> "np.ndarray":
 
 
 def _sets(pieces: list[dict[str, Any]], total: int) -> dict[str, "np.ndarray"]:
-    """Return arrays (nodes,), keyed by the name of the array of each set. A value is 1 if the node is in the set, else
-    0.
+    """Return a dictionary from the name of the array of each set to an array (nodes,). A value is 1 if the node is in
+    the set, else 0.
     """
     found = {name: np.zeros(total, np.uint8) for name in pieces[0]["sets"]}
     for piece in pieces:

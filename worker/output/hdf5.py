@@ -1,9 +1,9 @@
 """HDF5 files that are written safely even if the disk becomes full.
 
 After a failed write HDF5 continues with the data that it could not write. HDF5 then fails again at each object that is
-freed; Python can only print this error, and at last the process ends with a segmentation fault. In other cases an
-incomplete file can be opened as if it were complete; therefore this module records the failures of the disk and does
-not report them to HDF5.
+freed. Python can only print the errors at the freed objects, and at last the process ends with a segmentation fault. In
+other cases an incomplete file can be opened as if it were complete. Therefore this module records the failures of the
+disk and does not report them to HDF5.
 """
 
 import errno
@@ -49,7 +49,7 @@ def _at_once(path: str, flags: int) -> int:
 
 
 class _Disk:
-    """A file object for HDF5; after a failure of the disk it discards the data to be written, and reports success to
+    """File object for HDF5. After a failure of the disk it discards the data to be written, and reports success to
     HDF5.
     """
 
@@ -70,7 +70,7 @@ class _Disk:
         return size
 
     def readinto(self, room: Any) -> int:
-        """Fill ``room`` with data of the file. Where the file has no data, fill with zeros."""
+        """Fill ``room`` with data of the file. If the file has less data, fill the rest with zeros."""
         left = memoryview(room).cast("B")
         size = len(left)
         while left and (found := self._raw.readinto(left)):

@@ -1,5 +1,5 @@
 """The table history.csv. Each sample is one line, with clock, energy ledger, momenta, parts and probes. At the end of
-the run history.parquet gets the same data, if pyarrow is installed.
+the run the same data is written to history.parquet, if pyarrow is installed.
 """
 
 import csv
@@ -46,7 +46,7 @@ class History:
         self._file.flush()
 
     def close(self) -> None:
-        """Close the file. If pyarrow is installed, write the table also as history.parquet."""
+        """Close the file. If pyarrow is installed, also write the table as history.parquet."""
         self._file.close()
         write_parquet(self._path)
 
@@ -78,8 +78,8 @@ def extremes(folder: Path, names: Sequence[str]) -> dict[str, tuple[float, float
 
 
 def write_parquet(path: Path) -> Path | None:
-    """Write a history as a Parquet file into its folder. The metadata of the file have the unit of each column. Return
-    None if pyarrow is not installed.
+    """Write a history as a Parquet file into its folder. The metadata of the file contains the unit of each column.
+    Return None if pyarrow is not installed.
     """
     try:
         import pyarrow

@@ -19,7 +19,7 @@ from . import storage
 
 M = TypeVar("M", bound=messages.Message)
 _MOST = 1 << 40
-"""Largest size of a journal that is read, bytes; the value is so large that it is practically no limit."""
+"""Largest size of a journal that is read, bytes. The limit is so large that no journal of a run reaches it."""
 
 
 class _Head(msgspec.Struct):
@@ -33,10 +33,10 @@ _head = msgspec.json.Decoder(_Head)
 
 
 class Listener(Protocol):
-    """Interface of receivers of messages; a message is received after it was written to the journal."""
+    """Interface of receivers of messages. A receiver gets a message after it was written to the journal."""
 
     def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
-        """Receive a message without blocking; ``blob``: the bytes of a snapshot, or empty."""
+        """Receive a message without blocking; ``blob``: the bytes of a snapshot, or no bytes."""
 
 
 class Journal:
@@ -48,7 +48,7 @@ class Journal:
         self._path = path = folder / layout.JOURNAL
         self._run = run
         self.frames: set[int] = set()
-        """Indices of the frames of which the journal has a message."""
+        """Indices of the frames that have a message in the journal."""
         self.snapshots = 0
         """Number of the next snapshot; it continues the numbers of the snapshots in the journal."""
         self._file = whole.appended(path)
@@ -67,7 +67,7 @@ class Journal:
     def write(self, kind: type[M], step: int = 0, t: float = 0.0, blob: bytes = b"", **fields: Any) -> M:
         """Write one message and send it to readers, with the ``blob`` of a snapshot.
 
-        Raises OSError if the message cannot be written. The error is also raised if the file was removed, because the
+        Raises OSError if the message cannot be written. Also raises OSError if the file was removed, because the
         message would be lost.
         """
         storage.require(self._file, self._path)
@@ -90,7 +90,7 @@ class Journal:
 
 
 def _number(line: bytes) -> int:
-    """Return the number of a message, even if the message has another version; 0 for a line that is no message."""
+    """Return the number of a message, even if the message has another version; 0 for a line that is not a message."""
     try:
         return _head.decode(line).seq
     except (msgspec.DecodeError, UnicodeDecodeError):

@@ -1,4 +1,4 @@
-"""Removal of output that was written after the step of a checkpoint; a resumed run writes this output again."""
+"""Removal of output that was written after the step of a checkpoint. A resumed run writes the removed output again."""
 
 import csv
 import io
@@ -35,8 +35,8 @@ def lost(kept: int, written: int) -> list[str]:
 
 
 def _keep_below(path: Path, limit: int) -> int:
-    """Keep the header of a table and its complete lines whose first column is below ``limit``; return the number of
-    these lines. A table without a header is removed."""
+    """Keep the header of a table, and its complete lines whose first column is below ``limit``. Return the number of
+    lines that were kept. A table without a header is removed."""
     if not os.path.lexists(path):
         return 0
     with io.TextIOWrapper(io.BufferedReader(whole.opened(path)), "utf-8", "replace", newline="") as file:

@@ -1,5 +1,5 @@
-"""Standard output of a worker that runs without a server; it prints the start, a line for each percent of progress,
-warnings, and the end.
+"""Standard output of a worker that runs without a server. The module prints the start, a line for each percent of
+progress, warnings, and the end.
 """
 
 import contextlib
@@ -23,7 +23,7 @@ class Speaker:
         self._warned = set[str]()
 
     def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
-        """Print the information of a message that is new to the user."""
+        """Print the content of a message if it is new to the user."""
         match message:
             case messages.Status() if message.state == State.STARTING and message.message:
                 self._say(message, message.message)

@@ -11,7 +11,7 @@ _STORAGE = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.
 
 
 def gone(error: BaseException, folder: Path) -> bool:
-    """Return whether the error is about a file below ``folder`` that was removed or is not accessible."""
+    """Return True if the error is about a file below ``folder`` that was removed or is not accessible."""
     if not isinstance(error, OSError) or not isinstance(error.filename, str | bytes):
         return False
     path = Path(os.fsdecode(error.filename))
@@ -25,7 +25,7 @@ def require(file: IO[Any], path: Path) -> None:
 
 
 def failed(error: BaseException) -> bool:
-    """Return whether ``error`` was caused by a disk. The error number may be only in the text of an HDF5 error."""
+    """Return True if ``error`` was caused by a disk. The error number may be only in the text of an HDF5 error."""
     if isinstance(error, OSError) and error.errno in _STORAGE:
         return True
     if any(f"errno = {number}," in str(error) for number in _STORAGE):

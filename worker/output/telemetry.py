@@ -19,16 +19,16 @@ from conoid.cases import messages
 from conoid.cases.output import keys
 
 _RING = 1024
-"""Largest number of messages that wait for the network; chosen value: more than a minute of a run, which sends some ten
-messages a second."""
+"""Largest number of messages that wait for the network. Chosen value: more than a minute of a run, which sends about
+ten messages a second."""
 _BLOBS = 2
-"""Largest number of snapshots that wait for the network with their bytes; a snapshot has about a megabyte. Chosen
+"""Largest number of snapshots that wait for the network with their bytes. A snapshot has about a megabyte. Chosen
 value: the snapshot that is being sent, and the newest snapshot."""
 _RETRY = 2.0
 """Interval between two attempts to reach a router, s. Chosen value."""
 _LINGER = 1.0
-"""Longest time for which the last messages are sent at the end of a run, s; chosen value: messages that are not sent
-are still in the journal."""
+"""Longest time in which the last messages are sent at the end of a run, s. Chosen value: messages that are not sent are
+still in the journal."""
 
 log = logging.getLogger("conoid.worker")
 

@@ -14,8 +14,8 @@ from .fields import Wanted
 
 
 def wanted(sim: Simulation, index: int) -> Wanted:
-    """Return the requested fields of frame ``index`` and the data for them. This function must be called exactly once
-    for each frame.
+    """Return the requested fields of frame ``index`` and the data for them. The function ``wanted`` must be called
+    exactly once for each frame.
     """
     run = sim.case.run
     sets = {layout.set_array(name): bit for name, bit in bits(sim.case).items()}

@@ -29,8 +29,8 @@ _NUMBERS = {types.float64: REAL, types.boolean: FLAG}
 
 
 class Follow(NamedTuple):
-    """A number in the argument table of a stage that changes during a program. It is the product of a number of the
-    program and a constant factor.
+    """A number in the argument table of a stage that changes during a program: the product of a number of the program
+    and a constant factor.
     """
 
     number: int

@@ -26,22 +26,22 @@ _LEVELS = 2.0**31 - 1.0
 _ID_BITS = 32
 """Number of bits for the id in a sorting key of 63 bits. The 31 higher bits have the position; ids are below 2^32."""
 _DIGIT = 8
-"""Number of bits of a sorting key that are determined by one sum over the ranks. With the chosen value a sum has 256
-counts for each box, and eight sums are needed for a key."""
+"""Number of bits of a sorting key that are determined by one sum over the ranks. Chosen value: a sum has 256 counts for
+each box, and eight sums are needed for a key."""
 _FINEST = 2.0**30
 """Value of the largest weight in quanta; with this value sums of four billion weights are exact."""
 _BINS = 128
 """Number of slices along a direction. The weights of the points are summed in the slices when directions are
 compared."""
 _SHORT = 0.2
-"""Smallest ratio of an extent of a box to the longest extent of the box. A box is cut across an extent only if its
-ratio is at least this value (with extents scaled by ``run.cut_scale``)."""
+"""Smallest ratio of an extent of a box to the longest extent of the box. A box is cut across an extent only if the
+ratio of that extent is not smaller (with extents scaled by ``run.cut_scale``)."""
 _SURFACE = 0.05
 """Penalty for a cut that goes through twice as much weight as the cut in the direction with the least weight. The
 penalty is a fraction of the time of a step."""
 _TOGETHER = 8
-"""Number of boxes whose slices are summed over the ranks in one call. The number is fixed, so that the memory does not
-increase with the number of ranks."""
+"""Number of boxes whose slices are summed over the ranks in one call. The number of boxes is fixed, so that the memory
+does not increase with the number of ranks."""
 _THICK = 2
 """Number of slices on each side of a cut from which the weight at the cut is computed."""
 _SAMPLE = 4096
@@ -62,7 +62,7 @@ def _directions() -> Floats:
 
 DIRECTIONS = _directions()
 _AXES = 3
-"""Number of normals that are the axes x, y and z. They are the first normals."""
+"""Number of normals that are the axes x, y and z; the axes are the first normals."""
 
 
 @dataclass
@@ -269,8 +269,8 @@ def _slice(sums, points, quanta, chosen, directions, low, scale):  # type: ignor
 
 
 def _search(cuts: list[Cut], keys: list[Ints], quanta: list[Ints], comm: Comm) -> None:
-    """Set the key of every cut. The key is the smallest one at which the weight below the cut exceeds the weight that
-    the lower side must have.
+    """Set the key of every cut to the smallest key at which the weight below the cut exceeds the weight that the lower
+    side must have.
 
     Collective.
     """

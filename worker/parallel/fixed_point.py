@@ -2,8 +2,8 @@
 
 The scale of the nodal forces is computed from the largest contribution of the previous step. If a contribution is too
 large for the scale, the sum is repeated in a larger quantum. A contribution has 51 bits, and node 0 of a tet may get
-three contributions. Therefore the sum cannot overflow at a node with up to 680 tets. This is twenty times the number of
-tets at a node of a usual mesh.
+three contributions. Therefore the sum cannot overflow at a node with up to 680 tets, which is twenty times the number
+of tets at a node of a usual mesh.
 """
 
 import math
@@ -19,8 +19,8 @@ from ..model.state import Floats, Ints
 from .comm import Comm
 
 CONTRIBUTION_BITS = 51
-"""Number of bits of a contribution. A contribution is below 2^51 quanta. The reason: the sum of such a value and 1.5 *
-2^52 in float64 is rounded to an integer (elements/forces.py)."""
+"""Number of bits of a contribution. A contribution is below 2^51 quanta, because the sum of such a value and 1.5 * 2^52
+in float64 is rounded to an integer (elements/forces.py)."""
 HEADROOM_BITS = 5
 """Number of bits of headroom. Contributions may increase 32-fold in a step before the sum must be repeated."""
 _NEAREST_BITS = 0x4338000000000000
@@ -85,7 +85,7 @@ def limbs(values, scale):  # type: ignore[no-untyped-def]
     """Return the sums of the high and of the low limbs of ``values``, in quanta of 1 / ``scale`` and 2^-30 / ``scale``;
     undefined if a value reaches 2^51 quanta.
 
-    The last bits of x + NEAREST are the integer nearest to x; of two equally near integers the even one.
+    The last bits of x + NEAREST are the integer nearest to x; if two integers are equally near, the even one.
     """
     highs, lows = np.int64(0), np.int64(0)
     for i in range(len(values)):

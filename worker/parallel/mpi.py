@@ -160,8 +160,8 @@ class MpiComm:
 
 
 class _Waiting:
-    """Context of a block of code that waits. It is a class, because every step enters dozens of such contexts, and a
-    context made from a generator takes longer.
+    """Context of a block of code that waits. The context is a class, because every step enters dozens of such contexts,
+    and a context made from a generator takes longer.
     """
 
     __slots__ = ("_comm", "_sign", "_start")

@@ -59,7 +59,7 @@ def complete(comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: Tag) -> N
 
 
 class SharedSum:
-    """Completion of nodal sums, (nodes, ``columns``) int64. It can be repeated."""
+    """Completion of nodal sums, (nodes, ``columns``) int64, that can be repeated."""
 
     def __init__(
         self, comm: Comm, neighbours: list[Neighbour], columns: int, tag: Tag, *, headed: bool = False

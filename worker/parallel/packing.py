@@ -67,8 +67,8 @@ class Packing:
         """Copy the results of a pass over the range from 0 to ``n`` from ``source`` to ``out``; the two arrays have
         rows of one type.
 
-        The task that begins at index f has written ``counts`` rows to ``source``, from row ``spread`` * f on. These
-        rows are copied to ``out``, from the row given by ``begins`` on.
+        The task that begins at index f has written ``counts`` rows to ``source``, from row ``spread`` * f on. The rows
+        of a task are copied to ``out``, from the row given by ``begins`` on.
         """
         if n:
             width = source.dtype.itemsize * int(np.prod(source.shape[1:], dtype=np.int64))

@@ -2,9 +2,10 @@
 without Python code between them.
 
 A stage consists of a kernel, its table of arguments, and its tasks. The tasks are either given before the call
-(``Stage``), or they are a range (``Span``). The length of the range is a word of memory. The stage reads this word when
-it begins, so an earlier stage may write it. A stage with the length 0 is skipped. A kernel may also choose the next
-stage: it writes the number of this stage to ``Program.control``. A stage number beyond the last stage ends the call.
+(``Stage``), or they are a range (``Span``). The length of the range is a word of memory. The stage reads the length
+when it begins, so an earlier stage may write the length. A stage with the length 0 is skipped. A kernel may also choose
+the next stage: it writes the number of this stage to ``Program.control``. A stage number beyond the last stage ends the
+call.
 """
 
 from collections.abc import Sequence

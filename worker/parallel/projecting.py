@@ -24,8 +24,8 @@ _PAUSE = 100_000
 word in a loop (team.py)."""
 _REPEATS = 50
 _ROUNDS = 100_000
-"""Number of iterations of a task that takes longer than the waking of a thread. With the chosen value the task takes
-about 100 us."""
+"""Number of iterations of a task that takes longer than the waking of a thread. Chosen value: the task takes about 100
+us."""
 _WORDS = types.int64[::1], types.int64
 _words = reader(*_WORDS)
 

@@ -9,9 +9,9 @@ for the tasks that have begun, not for threads. If another program uses the core
 tasks. OpenMP would wait for every thread at the end of every parallel region, which takes milliseconds in that case
 (docs/performance/scaling.md, "Threads"). One word of memory contains the number of tasks and the index of the next
 task. A thread takes a task by an atomic increment of the word. A colour does not end before its last task, so the
-arguments of a task stay valid. Helpers read this word in a loop for about 50 us, then they sleep until the next pass.
-Waking a thread takes about 20 us of the time of another thread. Therefore the calling thread wakes one or two threads,
-and each woken thread wakes two more threads while there are tasks.
+arguments of a task stay valid. Helpers read the word of tasks in a loop for about 50 us, then they sleep until the next
+pass. Waking a thread takes about 20 us of the time of another thread. Therefore the calling thread wakes one or two
+threads, and each woken thread wakes two more threads while there are tasks.
 """
 
 import ctypes
@@ -46,9 +46,8 @@ _LINE = 8
 _WAKES = 2
 """Largest number of threads that one thread wakes."""
 _POLLS = 4000
-"""Number of reads of the task word before a helper sleeps, and before the calling thread yields its core. With the
-chosen value the reads take about 50 us, which is longer than the gap between two colours and much shorter than a
-step."""
+"""Number of reads of the task word before a helper sleeps, and before the calling thread yields its core. Chosen value:
+the reads take about 50 us, which is longer than the gap between two colours and much shorter than a step."""
 
 
 @njit("boolean(int64[::1], int64)", cache=True)
@@ -207,7 +206,7 @@ class Team:
 
     @property
     def within(self) -> float:
-        """Wall time in ``run`` so far, s. More threads would shorten this time."""
+        """Wall time in ``run`` so far, s. With more threads the wall time in ``run`` would be shorter."""
         return self._words[WITHIN] / SECOND
 
     @property

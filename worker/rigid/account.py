@@ -40,8 +40,8 @@ class BodyAccount:
             setattr(self, _KEPT[name], values.copy())
 
     def note(self) -> None:
-        """Adds the second halves of the energies of the last step, and stores the motion at n-1/2. This function must
-        be called before the kick.
+        """Adds the second halves of the energies of the last step, and stores the motion at n-1/2; to be called before
+        the kick.
         """
         self.contact_loss += self.later[0]
         self.external_work += self.later[1]
@@ -51,8 +51,8 @@ class BodyAccount:
         self.before[0], self.before[1] = self._bodies.speed, self._bodies.momentum
 
     def book(self, impulse: Floats, of_bonds: Floats, stops: BodyStops) -> None:
-        """Adds half of the work of the impulses, computed with the velocities before the impulses. Stores the half with
-        the velocities after the impulses for the next step.
+        """Adds half of the work of the impulses, computed with the velocities before the impulses. For the next step,
+        stores the half of the work that is computed with the velocities after the impulses.
 
         ``impulse`` (b, 6): impulses of contact and walls; ``of_bonds`` (b, 6): impulses of tied bonds. The work of all
         other changes of the motion, and of driven walls, is external work.
@@ -87,7 +87,7 @@ class BodyAccount:
 
     def quantity(self, body: int, field: str, axis: int, share: float) -> float:
         """Returns the kinetic energy of a body, J, or a component of ``momentum``, ``centre`` or ``centre_velocity``.
-        The last impulses have changed this value; the result contains the fraction ``share`` of the change.
+        The result contains only the fraction ``share`` of the change by the last impulses.
         """
         bodies, (speed, momentum) = self._bodies, self.before
         if field == "centre":

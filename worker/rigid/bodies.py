@@ -48,8 +48,8 @@ class Bodies:
         axis only, it is the inverse of the inertia about this axis."""
         self.free = np.array([each.free for each in self.held]).reshape(n, 3)
         self.turns = np.array([each.turns for each in self.held]).reshape(n, 3)
-        """(b, 3) 1 for an axis along which impulses may move the body, else 0. Then (b, 3) 1 for an axis about which
-        impulses may rotate the body, else 0."""
+        """(b, 3) 1 for an axis along which impulses may move the body, else 0. The second array (b, 3) is 1 for an axis
+        about which impulses may rotate the body, else 0."""
         self.loose = np.flatnonzero(self.turns.all(axis=1))
         """Indices of the bodies that can turn about all axes."""
         self.lightness = self.free / self.mass[:, None]

@@ -85,9 +85,7 @@ class BodyBonds:
         self._spread(v)
 
     def settle_start(self) -> None:
-        """Stores the present motion as the motion from which contact starts. This function must be called after the
-        warm start.
-        """
+        """Stores the present motion as the motion from which contact starts; to be called after the warm start."""
         self._start[0], self._start[1] = self._bodies.speed, self._rate
 
     @property

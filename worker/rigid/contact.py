@@ -22,9 +22,9 @@ class _Slots(NamedTuple):
     """Contact slots of the step that are nodes of rigid bodies."""
 
     slot: Indices
-    """(k,) index of each of these slots among all slots of the step."""
+    """(k,) index of each slot of a rigid body among all slots of the step."""
     body: Indices
-    """(k,) body of each of these slots."""
+    """(k,) body of each slot of a rigid body."""
     arm: Floats
     """(k, 3) vector from the centre of the body to each slot, m."""
     owned: Flags
@@ -61,8 +61,7 @@ class BodyContacts:
         self._bodies, self._stops, self._of_part, self._comm = bodies, stops, of_part, comm
         self._start, self._rate, self._reports = start, rate, reports
         self._total, self._scale = np.zeros((bodies.n, rows.WORDS), np.int64), 1.0
-        """(b, WORDS) contact impulses on each body in the step, quanta. The second value is the number of quanta per N
-        s."""
+        """(b, WORDS) contact impulses on each body in the step, quanta; and number of quanta per N s."""
         self._changed: Ints = np.zeros((bodies.n, rows.WORDS), np.int64)
         """(b, WORDS) contact impulses on each body in the last sweep, quanta."""
         self.active = False
@@ -121,8 +120,8 @@ class BodyContacts:
         pressed[self._slots.node[mine]] += self._slots.impulse[mine]
 
     def unsettled(self) -> Ints:
-        """(2,) two l1 norms over all ranks, on rank 0. The first is that of the changes of impulses and moments in the
-        last sweep; the second is that of the impulses and moments in the step (sweep_count.py in contact/solver).
+        """(2,) l1 norms over all ranks, on rank 0: of the changes of impulses and moments in the last sweep, and of the
+        impulses and moments in the step (sweep_count.py in contact/solver).
         """
         both = np.zeros(2, np.int64)
         if self._comm.rank == 0 and self.active:

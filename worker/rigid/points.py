@@ -41,8 +41,8 @@ class Points:
         Row i of a point at the arm a and row k of a point at the arm b of the same body have the product delta_ik / M +
         ([a] Y [b])_ik, where Y is the inverse of the inertia. The sum of the magnitudes over all rows of the body is
         bounded by N / M + |a_l| T_m + |a_m| T_l, where T_j = sum_k |Y_jk| L_k, and L_k is the sum of |b_l| + |b_m| over
-        the N points (i, l, m different). Y and the arms are those at the start. The largest of the three bounds is
-        valid in any orientation.
+        the N points (i, l, m different). The inverse inertia Y and the arms are those at the start. The largest of the
+        three bounds is valid in any orientation.
         """
         size, many = np.abs(self.arm), np.bincount(self.body, minlength=bodies.n)
         light = bodies.lightness.max(axis=1, initial=0.0)

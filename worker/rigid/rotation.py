@@ -6,10 +6,10 @@ equations: with p = R^T l in the body and m the mean of p before and after,
 
     m = p + dt/2 m x (I^-1 m),    q' = q (1, dt/2 I^-1 m) / norm.
 
-The second equation is the Cayley map of dt I^-1 m to a rotation. This rotation maps p to 2 m - p, so that l is
-conserved. The product of the first equation and I^-1 m shows that p . I^-1 p, which is twice the energy, is also
-conserved (Hairer, Lubich and Wanner 2006, Geometric Numerical Integration, IV.2: the midpoint rule preserves quadratic
-invariants). The error of the phase is of second order in dt.
+The second equation is the Cayley map of dt I^-1 m to a rotation. The rotation by the Cayley map maps p to 2 m - p, so
+that l is conserved. The product of the first equation and I^-1 m shows that p . I^-1 p, which is twice the energy, is
+also conserved (Hairer, Lubich and Wanner 2006, Geometric Numerical Integration, IV.2: the midpoint rule preserves
+quadratic invariants). The error of the phase is of second order in dt.
 """
 
 import numpy as np

@@ -15,8 +15,8 @@ from ..contact.solver.loading import SHARES
 from ..kernels.jit import njit, types
 
 WEIGHTS = 8
-"""Number of words of the weights of a body. The words are sums over its slots: of |w| |n_i|, of |arm x (|w| |n|)|_i
-divided by the reach, of |w|, and of |arm| |w|."""
+"""Number of words of the weights of a body. The words are sums over the slots of the body: of |w| |n_i|, of |arm x (|w|
+|n|)|_i divided by the reach, of |w|, and of |arm| |w|."""
 WORDS = 6
 """Number of words of an impulse (3), quanta, and of a moment (3), in quanta times the reach of the body."""
 _F, _F1, _F2, _F3 = types.float64, types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]

@@ -66,8 +66,8 @@ class Rigid:
         self._start, self._rate = np.zeros((2, bodies.n, 3)), np.zeros((bodies.n, 3))
         """Velocities and rotation vectors before the impulses of the step; and present rotation vectors, rad/s."""
         self.share = 1.0
-        """Fraction of the last change of the motion that the velocities of the nodes contain. It is below 1 at the end
-        of a run, when velocities are interpolated to n."""
+        """Fraction of the last change of the motion that the velocities of the nodes contain. The fraction is below 1
+        at the end of a run, when velocities are interpolated to n."""
         self.stops = BodyStops(
             walls, bodies, *stopped(case, nodes, bodies, beside, comm), _restitution(case, walls), _names(case)
         )
@@ -133,7 +133,7 @@ class Rigid:
         self._carry(nodes)
 
     def note(self) -> None:
-        """Adds the second half of the work of the last impulses. This function must be called before the kick."""
+        """Adds the second half of the work of the last impulses; to be called before the kick."""
         self.account.note()
 
     def kick(self, nodes: Nodes, dt: float, t: float) -> None:
@@ -188,8 +188,8 @@ class Rigid:
         self._carry(nodes)
 
     def tied(self, nodes: Nodes) -> None:
-        """Stores the motion from which contact starts, and sets the nodes to it. This function must be called after the
-        warm start of the tied bonds.
+        """Stores the motion from which contact starts, and sets the nodes to it; to be called after the warm start of
+        the tied bonds.
         """
         self.bonds.settle_start()
         self._carry(nodes)

@@ -26,7 +26,7 @@ from ..model.state import Flags, Floats, Indices, Ints
 from .bodies import Bodies, dot
 
 _NEAR = 2.0
-"""Factor that is multiplied by the motion of a body in a step. Walls within this distance of the body are checked."""
+"""Factor for the motion of a body in a step. Walls nearer to the body than the factor times this motion are checked."""
 _CLOSE = 1e-3
 """Length, divided by the reach of a body. The length is added to the distance within which walls are checked. If a node
 ends deeper than this length behind a wall, the run ends."""

@@ -41,7 +41,7 @@ from .signals import Signals
 from .summary import Times, sum_up
 
 CHOSEN, ALL, PROJECT = "chosen", "all", "project"
-"""Choices for the use of the threads of a rank; ``compute`` describes each choice."""
+"""Choices for the use of the threads of a rank. The function ``compute`` describes each choice."""
 
 log = logging.getLogger("conoid.worker")
 
@@ -52,8 +52,8 @@ def compute(
 ) -> Outcome:  # fmt: skip
     """Runs the case in ``folder`` and returns its outcome. Collective.
 
-    ``meshes``: folder to which the paths of mesh files are relative; ``restart``: whether to resume from the latest
-    checkpoint. ``use``: use of the threads. CHOSEN: as many threads as make the run faster; ALL: all threads; PROJECT:
+    ``meshes``: folder to which the paths of mesh files are relative; ``restart``: True to resume from the latest
+    checkpoint; ``use``: use of the threads. CHOSEN: as many threads as make the run faster. ALL: all threads. PROJECT:
     one thread, and the outcome has the estimated time with more threads. Raises ConoidError.
     """
     say = journal.starting if journal is not None else quiet
@@ -99,8 +99,8 @@ def compute(
 def _resumed(case: Case, folder: Path, comm: Comm, journal: Journal | None) -> tuple[Simulation, Start]:
     """Returns the simulation of the latest complete checkpoint in ``folder``.
 
-    Collective. Later checkpoints are damaged; the journal gets a warning for each of them. Raises InputError on all
-    ranks.
+    Collective. If later checkpoints exist, they are damaged, and the journal gets a warning for each of them. Raises
+    InputError on all ranks.
     """
     found: tuple[Path, Manifest] | None = None
     failure: InputError | None = None
@@ -126,8 +126,8 @@ def _resumed(case: Case, folder: Path, comm: Comm, journal: Journal | None) -> t
 
 
 def _rewound(folder: Path, sim: Simulation, journal: Journal | None, start: Start) -> Start:
-    """Removes output that was written after the first step of this process, and lines of the history. Returns ``start``
-    with a warning if lines of the history are missing.
+    """Removes output that an earlier process wrote after the step at which this process starts, including lines of the
+    history. Returns ``start``, with a warning if lines of the history are missing.
     """
     lost = rewind.lost(rewind.rewind(folder, sim.clock.step, sim.clock.frame), start.lines)
     checkpoint.forget(folder, sim.clock.step)

@@ -1,5 +1,5 @@
-"""Frames of a run; the module writes the files of the whole field and the messages about them, and warns if files were
-removed.
+"""Frames of a run. The module writes the files of the whole field and the messages about them. The module gives a
+warning if files of frames were removed.
 """
 
 from pathlib import Path
@@ -26,12 +26,14 @@ class Frames:
         """Warnings about output files that were removed during the run; only on rank 0."""
 
     def write(self, sim: Simulation) -> None:
-        """Write the frame of the present time; if the journal has no message of this frame, write the message."""
+        """Write the frame of the present time. Write also the message of the frame, unless the journal already has
+        it.
+        """
         clock, index, journal = sim.clock, sim.clock.frame, self._notices.journal
         sim.count_nodes()
         self.report_losses(sim)
         path = self._written(sim, index)
-        self.report_losses(sim)  # watch the new file from now on
+        self.report_losses(sim)  # from now on a removal of the new file is detected
         clock.frame += 1
         if path is not None and journal is not None and index not in journal.frames:
             journal.frames.add(index)

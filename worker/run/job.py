@@ -1,9 +1,9 @@
 """``python -m conoid.worker.run.job FOLDER NAME``: one attempt of a run inside a job of a batch system.
 
-The script of the job becomes this process; the program starts the ranks, sends the signal of the batch system to them,
+The script of the job becomes this process. The process starts the ranks, sends the signal of the batch system to them,
 and finds the cause of the signal. If the job was cancelled, the run ends. After a preemption or a time limit the same
 job is queued again, and the run resumes from its checkpoint. If the cause is unknown, the folder gets a checkpoint and
-no outcome; the server or the command that submitted the job then decides whether the run continues.
+no outcome. If there is no outcome, the server or the command that submitted the job decides whether the run continues.
 """
 
 import os
@@ -31,17 +31,17 @@ from .lock import hold
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _ASK_FOR = 20.0
-"""Longest time for which Slurm's controller is asked for the cause of a signal, s; chosen value: KillWait, 30 s by
+"""Longest time for which Slurm's controller is asked for the cause of a signal, s. Chosen value: KillWait, 30 s by
 default, after which Slurm ends this process."""
 _EARLY = 90.0
-"""Longest time before the time limit at which Slurm may send the signal (60 s, sbatch(1)), plus a margin for the
-checkpoint, s."""
+"""Longest time between the signal and the time limit of a job, s: Slurm may send the signal 60 s early (sbatch(1)),
+plus a margin for the checkpoint."""
 
 
 @dataclass
 class Relay:
-    """Handler that sends the signal TERM of the batch system to the ranks as USR1; it is not sent as TERM, because srun
-    takes a TERM as a request to end itself.
+    """Handler that sends the signal TERM of the batch system to the ranks as USR1. The signal is not sent as TERM,
+    because srun takes a TERM as a request to end itself.
     """
 
     child: "subprocess.Popen[bytes] | None" = None
@@ -57,7 +57,7 @@ class Relay:
         self.send()
 
     def send(self) -> None:
-        """Sends USR1 to the ranks if they run."""
+        """Sends USR1 to the ranks if they are running."""
         if self.child is not None and self.child.poll() is None:
             self.child.send_signal(signal.SIGUSR1)
 
@@ -91,8 +91,8 @@ def main(arguments: list[str]) -> int:
 def _place(given: Path, env: Mapping[str, str]) -> tuple[Path, str]:
     """Returns the run's folder, and the number of the job as the queue shows it.
 
-    A task of a job array finds its folder by its index, and from then on writes into the log of this folder. Raises
-    OSError.
+    A task of a job array finds its folder by its index. After the call the output of the process is written into the
+    log of the folder of the run. Raises OSError.
     """
     task = env.get("SLURM_ARRAY_TASK_ID", "")
     if not task or not (given / layout.ARRAY).exists():
@@ -145,8 +145,8 @@ def _run(folder: Path, job: Job, number: str, relay: Relay) -> int:
 
 
 def environment(base: Mapping[str, str], job: Job, access: batch.Access | None) -> dict[str, str]:
-    """Returns the environment of the ranks: settings for libraries with one thread, the run's id, and its Zenoh
-    credentials.
+    """Returns the environment of the ranks, which contains settings for libraries (one thread each), the run's id, and
+    the run's Zenoh credentials.
     """
     env = {**base, **dict.fromkeys(_ONE_THREAD, "1"), "CONOID_RUN": job.run}
     if access is not None and access.user:
@@ -203,7 +203,7 @@ def judge(found: Mapping[str, str], restarts: int, notice: float, now: float) ->
 
 
 def _seconds(text: str) -> float | None:
-    """Returns a duration such as ``1-02:03:04`` in s; None if there is no limit."""
+    """Converts a duration such as ``1-02:03:04`` to s. Returns None if there is no limit."""
     days, _, clock = text.rpartition("-")
     parts = clock.split(":")
     if not all(part.isdigit() for part in (*parts, days or "0")):
@@ -236,7 +236,9 @@ def _cancelled(folder: Path, job: Job, message: str) -> int:
 
 
 def _so_far(folder: Path, state: State, cause: Cause, message: str) -> Outcome:
-    """Returns the outcome that the interrupted ranks have written, with the true cause of the interruption."""
+    """Returns the outcome that the interrupted ranks have written, after the cause of the interruption in it is
+    corrected.
+    """
     try:
         found = outcome.from_json(whole.read(folder / layout.INTERRUPTED))
     except (OSError, msgspec.MsgspecError):

@@ -9,7 +9,7 @@ from typing import IO
 from conoid.cases.output import layout
 
 _PATIENCE = 20.0
-"""Time to wait for the former holder of the lock, s; chosen value: a killed run ends within seconds, and a network file
+"""Time to wait for the former holder of the lock, s. Chosen value: a killed run ends within seconds, and a network file
 system releases a lock within ten seconds."""
 _PAUSE = 0.2
 """Interval between two attempts to get the lock, s. Chosen value."""

@@ -1,4 +1,4 @@
-"""The time loop; it advances the simulation, runs the scheduled outputs, and ends the run."""
+"""The time loop, which advances the simulation, runs the scheduled outputs, and ends the run."""
 
 import gc
 import time
@@ -32,8 +32,8 @@ from .signals import Signals
 
 @dataclass(frozen=True)
 class Start:
-    """Sizes, counters and warnings at the first step of this process; they are stored in checkpoints for a resumed
-    run.
+    """Sizes, counters and warnings at the first step of this process. Checkpoints contain them, so that a resumed run
+    has the same values.
     """
 
     elements: int
@@ -41,11 +41,11 @@ class Start:
     thick: list[list[list[float]]]
     """Result of reference.thicknesses at the start."""
     sample: int = 0
-    """Number of samples scheduled so far."""
+    """Number of samples scheduled up to the first step of this process."""
     lines: int = 0
-    """Number of lines of the history file so far."""
+    """Number of lines that the history file had at the first step of this process."""
     updates: int = 0
-    """Sum of the numbers of tets over all steps so far."""
+    """Sum of the numbers of tets over all steps before the first step of this process."""
     resumed: bool = False
     warnings: tuple[str, ...] = ()
     """Warnings of the start of the run (Simulation)."""
@@ -81,7 +81,7 @@ class Loop:
     def run(self) -> None:
         """Take steps until the end time or a reason to stop. Raises PhysicsError."""
         gc.collect()
-        gc.freeze()  # otherwise a garbage collection scans all objects of numba, which takes a rank 0.1 s
+        gc.freeze()  # otherwise a garbage collection scans all objects of numba, which takes 0.1 s on each rank
         self.sim.timers.begin()
         self.sim.comm.sent.since_last()
         if not self._start.resumed:
@@ -99,14 +99,14 @@ class Loop:
                 self._notices.write(self.sim.clock, messages.Log, level="info", text=text)
 
     def _number_fragments(self) -> None:
-        """Number the fragments of the initial state, if no frame numbers them."""
+        """Give numbers to the fragments of the initial state, unless the first frame gives the numbers."""
         record, run = self.sim.record, self.sim.case.run
         if record is not None and not run.frames:
             record.update()
             record.number()
 
     def _attend(self) -> None:
-        """Carry out the requests of the last reduction, and write the requests of this rank into the next reduction."""
+        """Execute the requests of the last reduction. Write the requests of this rank into the next reduction."""
         sim = self.sim
         if sim.reduction.report:
             self._reports.write(sim, self.samples, self.updates)
@@ -118,7 +118,7 @@ class Loop:
             self._requests.propose(self.sim, self.balance, self.snapshots, now)
 
     def _first_half(self) -> None:
-        """Execute stages 1 to 9 of the step (step.py). Then run the outputs of time n."""
+        """Execute rows 1 to 9 of the table of the step (step.py). Then run the outputs of time n."""
         sim, clock = self.sim, self.sim.clock
         ending = clock.done or bool(sim.reduction.stop)
         before = sim.model.nodes.v.copy() if ending or self.samples.due(clock) else None
@@ -131,7 +131,9 @@ class Loop:
         self.snapshots.tell()
 
     def _second_half(self) -> None:
-        """Execute stages 11 to 15 of the step. Before stage 14, further quiet steps may be executed."""
+        """Execute rows 11 to 15 of the table of the step (step.py). Before row 14, further quiet steps may be
+        executed.
+        """
         sim, steps = self.sim, 0
         if self._requests.idle:
             wall, t, last = self._requests.next(sim.clock.t)
@@ -146,7 +148,7 @@ class Loop:
     def _put_out(self, before: Floats | None, *, ending: bool) -> None:
         """Run the scheduled outputs of time n.
 
-        ``before``: (nodes, 3) v(n-1/2) if a sample is scheduled.
+        ``before``: (nodes, 3) v(n-1/2), if a sample is scheduled.
         """
         sim, clock = self.sim, self.sim.clock
         with sim.timers.phase("output"):
@@ -167,7 +169,7 @@ class Loop:
         self.frames.report_losses(sim)
 
     def _rebalance(self) -> None:
-        """Move tets to other ranks if the load balance requires this and another step follows."""
+        """Move tets to other ranks if the load balance requires this and the run has a further step."""
         cause = None if self.sim.clock.done else self.balance.cause(self.sim)
         if cause is not None:
             with self.sim.timers.phase("balance"):
@@ -176,7 +178,7 @@ class Loop:
             self._notices.write(self.sim.clock, messages.Balance, cause=cause, **moved)
 
     def _checkpoint(self) -> None:
-        """Write the complete state to disk."""
+        """Write the complete state to disk as a checkpoint."""
         sim, stop, requests = self.sim, self.sim.reduction.stop, self._requests
         began, clock = time.monotonic(), sim.clock
         with sim.timers.phase("output"):

@@ -9,11 +9,11 @@ class Pace:
         self._rate: float | None = None
 
     def add(self, t: float, now: float) -> None:
-        """Adds a report: at the wall time ``now``, s, the simulated time was ``t``, s."""
+        """Adds a report to the mean: at the wall time ``now``, s, the simulated time was ``t``, s."""
         rate = (t - self._last[0]) / (now - self._last[1])
         self._rate = rate if self._rate is None else 0.9 * self._rate + 0.1 * rate
         self._last = (t, now)
 
     def left(self, t: float) -> float:
-        """Returns the wall time, s, that a further simulated time ``t``, s, will take."""
+        """Returns the wall time, s, that the simulation of a further time ``t``, s, will take."""
         return t / self._rate if self._rate else 0.0

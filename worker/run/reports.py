@@ -1,5 +1,5 @@
-"""Reports of a run. In the steps in which rank 0 requests a report, the progress of the run and the loads of the ranks
-are written to the journal.
+"""Reports of a run. If rank 0 requests a report in a step, the progress of the run and the loads of the ranks are
+written to the journal.
 """
 
 import logging
@@ -29,28 +29,29 @@ class _Load(NamedTuple):
     """Load of a rank since the last report."""
 
     work: dict[str, float]
-    """CPU seconds of this rank, keyed by phase."""
+    """CPU seconds of this rank in each phase."""
     others: dict[str, float]
-    """Waiting times, messages and outside nodes, keyed by the names in messages.Load."""
+    """Waiting times, messages and outside nodes, as a dictionary; the keys are the names in messages.Load."""
     counting: bool
-    """Whether fragments must be found; the value of rank 0 is used."""
+    """True if the fragments must be found. The flag of rank 0 is used."""
     projected: dict[int, dict[str, float]]
-    """Estimated CPU seconds, keyed by the number of threads and then by phase."""
+    """Estimated CPU seconds in each phase, for each number of threads."""
 
 
 class Reports:
-    """Reports of a run. Collects the loads of all ranks and writes the messages. Every method is collective."""
+    """Reports of a run. The object collects the loads of all ranks and writes the messages. Every method is
+    collective.
+    """
 
     def __init__(
         self, sim: Simulation, balance: Balance, groups: Groups, notices: Notices, counter: Counter, requests: Requests,
         updates: int,
     ) -> None:  # fmt: skip
-        """``updates``: sum of the numbers of tets over all steps so far."""
+        """``updates``: sum of the numbers of tets over all steps so far, which is the number of updates of tets."""
         self._balance, self._groups, self._notices, self._counter = balance, groups, notices, counter
         self._requests = requests
         self._step, self._updates = sim.clock.step, updates
-        """Number of the step of the last report; and the sum of the numbers of tets over all steps up to this
-        report."""
+        """Number of the step of the last report; and sum of the numbers of tets over all steps up to this report."""
         self._logged = -math.inf
         """Wall time of the last line of the log file, s."""
         self._pace = Pace(sim.clock.t, requests.reported)
@@ -98,7 +99,7 @@ class Reports:
         return sim.comm.share(_Load(spent.cpu, sent, counting, spent.projected))
 
     def _count(self, sim: Simulation, *, find: bool) -> None:
-        """Write the numbers of tets, nodes and fragments, if they have changed. ``find``: whether the fragments are
+        """Write the numbers of tets, nodes and fragments, if they have changed. ``find``: True if the fragments must be
         found first.
         """
         if find:

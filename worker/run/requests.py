@@ -17,11 +17,13 @@ from .signals import Signals
 from .stops import CANCELLED, MAX_STEPS, WALL_TIME
 
 _REPORT_EVERY = 0.25
-"""Wall time between two reports, s; chosen value: a display that is updated four times a second moves smoothly."""
+"""Wall time between two reports, s. Chosen value: a display that is updated four times a second moves smoothly."""
 
 
 class Requests:
-    """Writes the requests of this rank into the next reduction, in steps in which a request may begin or end."""
+    """Object that writes the requests of this rank into the next reduction, in steps in which a request may begin or
+    end.
+    """
 
     def __init__(self, case: Case, folder: Path, signals: Signals, groups: Groups, began: float) -> None:
         """``began``: wall time at which the steps began, s."""
@@ -29,31 +31,31 @@ class Requests:
         self.reported = self.kept = began
         """Wall times of the last report and of the last checkpoint, s."""
         self._stop_file = False
-        """Whether a file has requested a stop."""
+        """True if a file has requested a stop."""
         self._active = True
-        """Whether this rank wrote a request into the last reduction that it filled."""
+        """True if this rank wrote a request into the last reduction that it filled."""
         self._every_step = case.balance.policy == "outside"
-        """Whether the requests are written in every step; this is necessary if the number of outside nodes is compared
-        with its limit in every step."""
+        """True if the requests are written in every step, which is necessary if the number of outside nodes must be
+        compared with its limit in every step."""
         self._wall = self._time = 0.0
-        """Wall time, s, and simulated time, s, before which no request can begin."""
+        """Two times before which no request can begin: wall time, s, and simulated time, s."""
 
     @property
     def idle(self) -> bool:
-        """Whether no request is in progress, and no request depends on the step."""
+        """True if no request is in progress, and no request depends on the step."""
         return not (self._active or self._every_step)
 
     def next(self, t: float) -> tuple[float, float, int]:
         """Return three bounds before which no request can begin: wall time, s, simulated time, s, and number of the
         step.
 
-        If the scheduled simulated time of a request is before ``t``, s, the request waits only because snapshots have a
-        smallest interval in wall time; such a request has no bound in simulated time.
+        A request may be scheduled for a simulated time before ``t``, s. A request with a time before ``t`` waits only
+        because snapshots have a smallest interval in wall time; it has no bound in simulated time.
         """
         return self._wall, self._time if self._time > t else math.inf, self._run.max_steps - 1
 
     def due(self, clock: Clock, now: float) -> bool:
-        """Return whether the requests may have changed before the wall time ``now``, s."""
+        """Return True if the requests may have changed before the wall time ``now``, s."""
         last = clock.step + 1 >= self._run.max_steps
         return (
             now >= self._wall or clock.t >= self._time or self._active or self._every_step
@@ -62,7 +64,7 @@ class Requests:
 
     @property
     def for_checkpoint(self) -> bool:
-        """Whether a file requests a checkpoint."""
+        """True if a file requests a checkpoint."""
         return (self._folder / layout.CHECKPOINT_REQUEST).exists()
 
     def propose(self, sim: Simulation, balance: Balance, snapshots: Snapshots, now: float) -> None:
@@ -87,7 +89,7 @@ class Requests:
     def _stop(self, clock: Clock, now: float, *, read_files: bool) -> int:
         """Return the reason for a stop; 0 if there is no reason.
 
-        ``read_files``: whether to look on disk for the file that requests a stop.
+        ``read_files``: True to search the disk for the file that requests a stop.
         """
         self._stop_file |= read_files and (self._folder / layout.STOP_REQUEST).exists()
         if clock.step + 1 >= self._run.max_steps:

@@ -14,7 +14,7 @@ from ..simulation import Simulation
 
 
 class Samples:
-    """Takes samples and keeps the latest sample."""
+    """Object that takes samples and stores the latest sample."""
 
     def __init__(self, sim: Simulation, history: History | None, number: int, lines: int) -> None:
         """``history``: the history file, None on all ranks except 0; ``number``: number of samples scheduled so far;
@@ -29,9 +29,9 @@ class Samples:
         self.lines = lines
         """Number of samples that were taken so far."""
         self.next = number * run.end_time / run.samples
-        """Time of the next sample, s."""
+        """Simulated time of the next sample, s."""
         self.time: float | None = None
-        """Time of the latest sample, s."""
+        """Simulated time of the latest sample, s."""
         self.energy: Energy | None = None
         self.parts: dict[str, PartEnergy] = {}
         self.measured: list[float] = []
@@ -42,7 +42,9 @@ class Samples:
         return clock.t >= self.next
 
     def probes(self) -> dict[str, float | None]:
-        """Return the latest value of each probe, keyed by name. NaN is returned as None, because JSON has no NaN."""
+        """Return a dictionary from the name of each probe to its latest value. NaN is returned as None, because JSON
+        has no NaN.
+        """
         named = zip(self._names, self.measured, strict=True)
         return {name: None if math.isnan(value) else value for name, value in named}
 

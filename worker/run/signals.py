@@ -1,4 +1,4 @@
-"""Requests to stop by the signals SIGTERM, SIGUSR1 and SIGINT. A signal sets a flag, and the reduction of the next step
+"""Requests to stop by the signals SIGTERM, SIGUSR1 and SIGINT. A signal sets a flag. The reduction of the next step
 sends the flag to all ranks.
 """
 
@@ -8,7 +8,7 @@ REQUESTS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT)
 
 
 class Signals:
-    """Handlers of the signals. The constructor installs the handlers; the flag is first read when the run has
+    """Handlers of the signals. The constructor installs the handlers. The flag is not read before the run has
     started.
     """
 

@@ -1,5 +1,5 @@
-"""The outcome of a run. The module collects the end, the sizes, the costs, the results and the warnings of a run from
-all ranks.
+"""The outcome of a run. The module collects the reason of the end, the sizes, the costs, the results and the warnings
+of a run from all ranks.
 """
 
 import math
@@ -108,7 +108,7 @@ def _costs(loop: Loop, start: Start, times: Times) -> dict[str, Any]:
 
 
 def _sharing(sim: Simulation) -> Sharing | None:
-    """Return the numbers of parallel regions and of tasks of this rank, if the costs of parallel regions were
+    """Return the number of parallel regions and the number of tasks of this rank, if the costs of parallel regions were
     measured.
     """
     made = team(sim.case.run.threads).projecting
@@ -136,7 +136,7 @@ def _penetration(sim: Simulation, labels: list[Ints]) -> tuple[dict[str, Any], l
 
 
 def _probes(loop: Loop, folder: Path) -> list[Measured]:
-    """Return the last value of each probe. On rank 0, return also the extremes of each probe in the whole history."""
+    """Return the last value of each probe. On rank 0, also return the extremes of each probe in the whole history."""
     probes = loop.sim.case.probes
     ends = extremes(folder, [probe.name for probe in probes]) if loop.sim.comm.rank == 0 else {}
     found = []
@@ -147,7 +147,7 @@ def _probes(loop: Loop, folder: Path) -> list[Measured]:
 
 
 def _warnings(loop: Loop, eroded: int) -> list[str]:
-    """Return the warnings that arose in steps; ``eroded``: number of removed tets."""
+    """Return the warnings that occurred in steps; ``eroded``: number of removed tets."""
     sim = loop.sim
     return [
         *loop.warnings, *loop.frames.lost, *sim.ledger.warnings(sim.case.numerics.dt_safety),

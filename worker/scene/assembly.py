@@ -1,5 +1,5 @@
-"""Construction of the whole mesh of a case on rank 0. The meshes of all parts are rotated, overlaps are removed, and
-loads and initial velocities are added.
+"""Construction of the whole mesh of a case on rank 0. The module rotates the meshes of all parts, removes overlaps, and
+adds loads and initial velocities.
 """
 
 import logging
@@ -54,7 +54,7 @@ class Whole:
     across: Indices
     """(tets, 4) neighbours of the faces of each tet (state.Block.across)."""
     shares: Shares
-    """Masses that each part has in the nodes that several parts share."""
+    """Masses of the parts in the nodes that several parts share."""
     node_volume: Floats
     mass: Floats
     velocity: Floats
@@ -64,7 +64,7 @@ class Whole:
     """Pieces of the tied bonds between meshes that do not match."""
     near: Nearness
     marks: Ints
-    """(nodes,) sets that contain each node, as bits (state.Nodes.marks)."""
+    """(nodes,) sets that contain each node, one bit for each set (state.Nodes.marks)."""
     warnings: list[str]
     """Warnings about the meshes and about the regions of the boundaries."""
     survey: Survey
@@ -72,7 +72,7 @@ class Whole:
 
 
 def quiet(what: str) -> None:
-    """Report no phase of the start."""
+    """Do not report the phases of the start."""
 
 
 def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
@@ -104,8 +104,8 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
     """Return the whole mesh, made from the ``meshes`` of the parts and their part numbers. Raises MeshError,
     InputError.
 
-    In a check before a run some parts may be missing. Then a boundary selects nodes and faces only if all its parts are
-    present. ``overlaps``: whether overlaps between bodies are searched for.
+    In a check before a run some parts may be missing. In a check before a run, a boundary selects nodes and faces only
+    if all its parts are present. ``overlaps``: True if the function searches for overlaps between bodies.
     """
     made = stacked(case, meshes, overlaps)
     x, t, part_of_tet, warnings = made.points, made.tets, made.tet_part, made.warnings
@@ -147,9 +147,7 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
 
 
 def _shares(case: schema.Case, made: Stacked, masses: Floats) -> Shares:
-    """Return the masses that each part has in the nodes of several parts, from the ``masses`` (tets,) of the tets,
-    kg.
-    """
+    """Return the masses of the parts in the nodes of several parts. ``masses`` (tets,): mass of each tet, kg."""
     rank = ranks(case)
     if not len(rank):
         return Shares()

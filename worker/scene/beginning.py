@@ -1,5 +1,5 @@
-"""Trial start of a run before the run is submitted. The trial gives the errors and warnings that the start of the run
-would give.
+"""Trial start of a run before its submission. The trial gives the errors and warnings that the start of the run would
+give.
 """
 
 from collections.abc import Mapping
@@ -16,8 +16,8 @@ def begun(case: Case, meshes: Mapping[int, TetMesh], compiled: bool) -> list[str
     """Return the warnings that a run gives up to its first step. Raises the InputError or MeshError that the start of
     the run would raise.
 
-    ``meshes``: meshes keyed by part number, of all parts or of the parts from files; ``compiled``: whether kernels are
-    compiled. Overlaps are searched for only if kernels are compiled.
+    ``meshes``: dictionary from part numbers to meshes, of all parts or of the parts from files; ``compiled``: True if
+    kernels are compiled. The function searches for overlaps only if kernels are compiled.
     """
     whole, comm = assembled(case, meshes.items(), compiled), SerialComm()
     model, piece = domain.alone(case, whole)

@@ -38,8 +38,9 @@ def loads(parcel: Parcel) -> list[Load | LoadedFaces]:
 def walls_of(case: schema.Case) -> Walls:
     """Return the walls of a case in their initial position.
 
-    If parts are rigid, each symmetry plane adds two walls: one for bodies above the plane and one for bodies below it;
-    a contact between a body and such a wall represents the contact between the body and its mirror image.
+    If the case has rigid parts, each symmetry plane adds two walls: one for bodies above the plane and one for bodies
+    below it. A contact between a rigid body and the wall of a symmetry plane represents the contact between the body
+    and its mirror image.
     """
     planes = case.boundaries_of(schema.Symmetry) if case.rigid else []
     images = [_image(spec, sign) for _, spec in planes for sign in (1.0, -1.0)]
@@ -60,7 +61,7 @@ def bodies_beside(case: schema.Case, model: Model, comm: Comm) -> Ints:
     """Return (planes, parts) the side of each symmetry plane on which a rigid part starts: 1 above, -1 below, 0 for all
     other parts.
 
-    The value is 0 if the plane does not act on the part, or if the part has a node on the plane. Collective.
+    The side is also 0 if the plane does not act on the part, or if the part has a node on the plane. Collective.
     """
     planes, nodes = case.boundaries_of(schema.Symmetry), model.nodes
     found = np.zeros((len(planes), len(model.parts)), np.int64)
@@ -78,7 +79,7 @@ def build(
     """Return the boundaries of a case on this rank's nodes, in the order in which they act. Collective.
 
     Gravity and tractions come first, so that constraints correct their effect. Walls come last and omit nodes with a
-    prescribed motion. Rigid parts have their own motion (rigid/motion.py) and appear here only in symmetry planes.
+    prescribed motion. Rigid parts have their own motion (rigid/motion.py); only symmetry planes act on them here.
     ``loads``: loads of the tractions; ``moving``: walls of the case in their present position.
     """
     nodes = model.nodes
@@ -109,7 +110,7 @@ def build(
 
 
 def held_by(case: schema.Case, spec: schema.Boundary, model: Model) -> Flags:
-    """Return (n,) whether a boundary acts on each node."""
+    """Return (n,) True for each node on which a boundary acts."""
     nodes, on_set = model.nodes, isinstance(spec, schema.Prescribed | schema.Rotation) and spec.on is not None
     marked = marks.held(nodes.marks, bits(case)[str(getattr(spec, "on", ""))]) if on_set else np.True_
     if isinstance(spec, schema.Prescribed):
@@ -119,13 +120,14 @@ def held_by(case: schema.Case, spec: schema.Boundary, model: Model) -> Flags:
 
 
 def of_parts(spec: schema.Boundary, model: Model) -> Flags:
-    """Return (n,) whether each node belongs to a part that the boundary names."""
+    """Return (n,) True for each node of a part that the boundary names."""
     return model.nodes.among(selection.named(spec, model.parts))
 
 
 def heights(case: schema.Case, spec: schema.Symmetry, model: Model) -> Floats:
     """Return (n,) the heights of nodes above a symmetry plane at the start, m. The height is 0 for nodes within
-    round-off of the plane; it is also 0 for nodes of the plane's set that are within the slack of their part.
+    round-off of the plane. The height is also 0 for nodes of the plane's set if they are within the tolerance of their
+    part.
     """
     found, part = model.nodes.x0[:, AXES[spec.axis]] - spec.at, model.nodes.part
     within = model.rounding[part]
@@ -135,8 +137,8 @@ def heights(case: schema.Case, spec: schema.Symmetry, model: Model) -> Floats:
 
 
 def on_plane(case: schema.Case, spec: schema.Symmetry, model: Model) -> Flags:
-    """Return (n,) whether each node starts on a symmetry plane. If the plane has a set of nodes, these are the nodes of
-    the set, else the nodes at the plane.
+    """Return (n,) True for each node that starts on a symmetry plane. If the plane has a set of nodes, these are the
+    nodes of the set; else they are the nodes at the plane.
     """
     there = heights(case, spec, model) == 0.0
     return there if spec.on is None else np.asarray(there & _marked(case, spec, model))
@@ -147,14 +149,14 @@ def _marked(case: schema.Case, spec: schema.Symmetry, model: Model) -> Flags:
 
 
 def sides(case: schema.Case, spec: schema.Symmetry, model: Model) -> Floats:
-    """Return (n,) the side of a symmetry plane on which each node starts: 1 above, -1 below. The value is 0 for nodes
-    at the plane, and for nodes on which the plane does not act.
+    """Return (n,) the side of a symmetry plane on which each node starts: 1 above, -1 below. The side is 0 for nodes at
+    the plane, and for nodes on which the plane does not act.
     """
     return np.where(of_parts(spec, model), np.sign(heights(case, spec, model)), 0.0)
 
 
 def node_sides(case: schema.Case, spec: schema.Symmetry, model: Model, comm: Comm) -> Floats:
-    """Return ``sides``, but with the side of the part for nodes that are at the plane and not in its set.
+    """Return a copy of ``sides``. Nodes that are at the plane and not in its set get the side of their part.
     Collective.
     """
     side = sides(case, spec, model)
@@ -167,7 +169,7 @@ def node_sides(case: schema.Case, spec: schema.Symmetry, model: Model, comm: Com
 def part_sides(case: schema.Case, spec: schema.Symmetry, model: Model, comm: Comm) -> Floats:
     """Return (parts,) the side of a symmetry plane: 1 for a part above the plane, -1 for a part below.
 
-    The value is 0 for a part on which the plane does not act, and for a part with nodes on both sides. Collective.
+    The side is 0 for a part on which the plane does not act, and for a part with nodes on both sides. Collective.
     """
     side, found = sides(case, spec, model), np.zeros((2, len(model.parts)))
     nodes, part = model.nodes.of_parts()

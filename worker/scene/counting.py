@@ -18,11 +18,11 @@ from .marks import marks
 from .setting import turned
 
 Meshes = Mapping[int, TetMesh]
-"""Meshes keyed by part number, before the rotation of their part."""
+"""Dictionary from part numbers to meshes. The meshes are not yet rotated with their part."""
 
 
 def loads(case: Case, meshes: Meshes) -> Iterator[Load]:
-    """Yield the count of each boundary whose parts all have a mesh in ``meshes``; the run gives the same counts.
+    """Yield the count of each boundary whose parts all have a mesh in ``meshes``. The run gives the same counts.
 
     Raises InputError if a bond has no common nodes.
     """

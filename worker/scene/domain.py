@@ -1,8 +1,8 @@
 """Division of the whole mesh among the ranks. Each rank receives its tets and nodes, shared nodes, masses and blocks of
 tets.
 
-Rank 0 builds the whole mesh (assembly.py), numbers its tets and nodes, and divides it. For any number of ranks, global
-ids have the order of the parts and, within a part, the order of the mesh.
+Rank 0 builds the whole mesh (assembly.py), numbers its tets and nodes, and divides it. Global ids have the order of the
+parts and, within a part, the order of the mesh, for any number of ranks.
 """
 
 import math
@@ -38,7 +38,7 @@ GROUPS = 256
 
 @dataclass
 class Piece:
-    """The data of the whole mesh that one rank receives."""
+    """Data of the whole mesh that one rank receives."""
 
     node_ids: Ints
     node_part: Indices
@@ -49,7 +49,7 @@ class Piece:
     mass: Floats
     node_volume: Floats
     shares: Shares
-    """Masses that each part has in the nodes that several parts share."""
+    """Masses of the parts in the nodes that several parts share."""
     loads: list[Load | LoadedFaces]
     """Loads of the tractions on all nodes of this rank. The load of a pressure that follows the surface consists of
     faces of the tets of this rank."""
@@ -79,7 +79,7 @@ class Piece:
     rounding: Floats
     """(parts,) tolerances with which nodes are compared with regions and symmetry planes, m (state.Model)."""
     marks: Ints
-    """(nodes,) sets that contain each node, as bits (state.Nodes.marks)."""
+    """(nodes,) sets that contain each node, one bit for each set (state.Nodes.marks)."""
     warnings: list[str]
     """Warnings about the meshes and the boundaries (assembly.Whole)."""
 
@@ -88,7 +88,7 @@ def cut(whole: Whole, ranks: int, scale: tuple[float, float, float] = (1.0, 1.0,
     """Return the pieces of the mesh for ``ranks`` ranks. The centres of the tets are divided by recursive bisection. A
     rank gets all nodes of its tets.
 
-    Before the bisection the centres are multiplied by ``scale``: a direction with a small factor is cut last. Raises
+    Before the bisection the centres are multiplied by ``scale``. A direction with a small factor is cut last. Raises
     InputError if there are more ranks than tets.
     """
     if ranks > len(whole.tets):
@@ -180,7 +180,7 @@ def _warned(case: schema.Case, folder: Path, survey: Survey) -> list[str]:
     """Return the warnings about the case that ``conoid validate`` would give."""
     try:
         expected = estimate(case, folder, survey)
-    except (ArithmeticError, ValueError):  # too many elements to count; the reader of the case refuses such a case
+    except (ArithmeticError, ValueError):  # if the case has too many elements to count, its reader gives an error
         return []
     return [str(each) for each in warned(case, expected, survey, [*touching(case), *survey.touching])]
 
@@ -235,8 +235,8 @@ def _density(part: schema.Part, density: float, piece: Piece, index: int) -> flo
 def block(
     case: schema.Case, index: int, ids: Ints, tets: Tets, state: Floats, across: Indices, border: int
 ) -> Block:  # fmt: skip
-    """Return the block of tets of part ``index``, made from the case and from the arrays of its tets; the ``border``
-    tets come first.
+    """Return the block of tets of part ``index``. The block is made from the case and from the arrays of the tets of
+    the part; the ``border`` tets come first.
     """
     part = case.parts[index]
     material = find_material(case, part.material)

@@ -1,5 +1,5 @@
-"""Measurements of meshes from files at the start of a run: size, mass, momentum, energy, and contact between their
-surfaces.
+"""Measurements of meshes from files at the start of a run: size, mass, momentum, energy, and contact between the
+surfaces of the meshes.
 """
 
 import numpy as np
@@ -16,10 +16,10 @@ from .setting import turned, velocities
 
 
 class Facts:
-    """Measurements of the parts of a case; meshes are added one by one."""
+    """Measurements of the parts of a case. The meshes are added one by one."""
 
     def __init__(self, case: Case) -> None:
-        """Start with no measured part."""
+        """Create an object without measured parts."""
         self._case = case
         self.parts: list[Surveyed] = []
         self._surfaces: dict[int, Surface] = {}
@@ -59,8 +59,8 @@ def _measured(case: Case, index: int, mesh: TetMesh, surface: Surface) -> Survey
 
 
 def _smallest_altitude(mesh: TetMesh, volumes: Floats) -> float:
-    """Return the smallest altitude of the tets, m. The smallest altitude of a tet is three times its volume divided by
-    the area of its largest face.
+    """Return the smallest altitude of all tets, m. The smallest altitude of one tet is three times its volume divided
+    by the area of its largest face.
     """
     largest = areas(mesh.points, mesh.tets[:, FACES].reshape(-1, 3)).reshape(-1, 4).max(axis=1)
     return float((3.0 * volumes / largest).min())

@@ -32,7 +32,7 @@ def grouped(case: Case, index: int) -> list[int]:
 def built_together(
     case: Case, group: list[int], folder: Path, before: Callable[[], None] = lambda: None
 ) -> dict[int, TetMesh]:
-    """Return the meshes of the parts of a ``group``, keyed by their part numbers. ``before`` is called before the
+    """Return a dictionary from part numbers to meshes, for the parts of a ``group``. ``before`` is called before the
     meshes are made."""
     meshes = {f"parts[{i}].mesh": asked(case.parts[i]) for i in group}
     return dict(zip(group, build_together(meshes, folder, made=before), strict=True))

@@ -29,7 +29,7 @@ def loads(
 
     A traction gives a third of the force on each face to each node of the face, in the order of the tets. A pressure
     that follows the surface stores the faces instead of the forces. ``of_tets``: (m, 4) tets, and (m,) their parts. A
-    traction that is not ``known`` gets no face. Raises InputError for a known traction that selects no face.
+    traction whose flag ``known`` is False gets no face. Raises InputError for another traction that selects no face.
     """
     tractions = case.boundaries_of(schema.Traction)
     loads, found, warnings = list[Load | LoadedFaces](), list[Selected](), list[str]()
@@ -57,8 +57,8 @@ def loads(
 
 
 def _bonded(index: int, faces: Ints, tied: Pieces) -> list[str]:
-    """Return a warning for a traction that loads bonded interfaces, because an interface is no free surface. ``faces``:
-    (m,) numbers of the loaded faces, 4 * tet + local face.
+    """Return a warning for a traction that loads bonded interfaces. An interface is not a free surface. ``faces``: (m,)
+    numbers of the loaded faces, 4 * tet + local face.
     """
     areas = tied.weights.sum(axis=1)
     area = float(areas[np.isin(tied.slave, faces)].sum() + areas[np.isin(tied.master, faces)].sum())
@@ -85,8 +85,8 @@ def _load(spec: schema.Traction, tets: Ints, faces: Ints, outward: Floats) -> Lo
 def driven(
     case: schema.Case, x: Floats, members: Members, near: Nearness, known: list[bool], marked: Marks
 ) -> tuple[list[Selected], list[str]]:
-    """Return the nodes that the prescribed velocities select, and warnings. Only velocities that are ``known`` are
-    processed.
+    """Return the nodes that the prescribed velocities select, and warnings. Only velocities whose flag ``known`` is
+    True are processed.
     """
     found, warnings = list[Selected](), list[str]()
     for index in (index for index, _ in case.boundaries_of(schema.Prescribed) if known[index]):

@@ -15,7 +15,7 @@ from ..mesh.model import NodeSet, TetMesh
 from ..model.state import Flags, Indices, Ints
 
 Meshes = Mapping[int, tuple[TetMesh, Ints]]
-"""Meshes keyed by part number, with the global indices (n,) of their nodes."""
+"""Dictionary from part numbers to pairs: a mesh, and the global indices (n,) of its nodes."""
 
 
 @dataclass
@@ -23,21 +23,22 @@ class Marks:
     """Membership of nodes and faces in the sets of mesh files."""
 
     nodes: Ints
-    """(n,) sets that contain each node: bit b is set if the node is in set b of ``cases.on.bits``. The array is (0,) if
-    the case refers to no set."""
+    """(n,) sets that contain each node: bit b is set if the node is in the set with the bit b of ``cases.on.bits``. The
+    array is (0,) if the case refers to no set."""
     faces: dict[int, Ints] = field(default_factory=dict)
-    """(k, 3) nodes of the faces of each surface, keyed by the bit of the surface. The nodes of a face are ascending."""
+    """Dictionary from the bit of a surface to (k, 3) the nodes of its faces. The nodes of a face are ascending."""
     surfaces: dict[int, set[int]] = field(default_factory=dict)
-    """Parts in which a set is a surface, keyed by the bit of the set."""
+    """Dictionary from the bit of a set to the parts in which the set is a surface."""
     warnings: list[str] = field(default_factory=list)
     """Warnings for the user."""
 
     def holds(self, bit: int) -> Flags:
-        """Return (n,) whether each node is in the set of a bit."""
+        """Return (n,) True for each node that is in the set of a bit."""
         return held(self.nodes, bit)
 
     def chosen(self, bit: int, faces: Indices, part: Indices) -> Flags:
-        """Return (m,) whether a set contains each of the exposed faces (m, 3). ``part``: (m,) the parts of the faces.
+        """Return (m,) True for each of the exposed faces (m, 3) that a set contains. ``part``: (m,) the parts of the
+        faces.
 
         A surface contains its faces. A set of nodes contains the faces with all nodes in the set.
         """
@@ -53,7 +54,7 @@ class Marks:
 
 
 def held(marks: Ints, bit: int) -> Flags:
-    """Return (n,) whether each node has the bit of a set."""
+    """Return (n,) True for each node that has the bit of a set."""
     return np.asarray((marks >> bit & 1).astype(bool))
 
 
@@ -61,7 +62,7 @@ def marks(case: Case, meshes: Meshes, n: int, boundary: int | None = None) -> Ma
     """Return the marks of ``n`` nodes. Raises MeshError if a set does not exist or has no node, or if a name is
     ambiguous.
 
-    ``boundary``: if given, only sets of this boundary and of symmetry planes are used.
+    ``boundary``: if it is given, only the sets of this boundary and of symmetry planes are used.
     """
     bits = on.bits(case)
     made = Marks(np.zeros(n if bits else 0, np.int64))
@@ -84,7 +85,7 @@ def marks(case: Case, meshes: Meshes, n: int, boundary: int | None = None) -> Ma
 
 
 def _found(case: Case, name: str, candidates: Sequence[int], meshes: Meshes, each: bool) -> list[tuple[int, NodeSet]]:
-    """Return the set with the given name in each part; ``each``: whether every part must have the set."""
+    """Return, for each part, the set with the given name. ``each``: True if every part must have the set."""
     if not candidates:
         return []
     found = [(index, meant(meshes[index][0].sets, name)) for index in candidates]

@@ -1,5 +1,5 @@
-"""Warning about bodies that are very far from the origin. The round-off of their coordinates acts as a strain that is
-not negligible.
+"""Warning about bodies that are very far from the origin. The round-off of their coordinates has the effect of a strain
+that is not negligible.
 """
 
 import numpy as np
@@ -11,14 +11,14 @@ from ..materials.elementary import power
 from ..model.state import Floats, Indices
 
 _STRAIN = 1e-6
-"""Smallest strain by round-off that gives a warning; chosen value: it corresponds to 0.2 MPa in steel."""
+"""Smallest strain by round-off that gives a warning. Chosen value: it corresponds to 0.2 MPa in steel."""
 
 
 def remote(case: Case, x: Floats, tets: Indices, part: Indices, volumes: Floats) -> list[str]:
-    """Return a warning for each part whose coordinates ``x`` (n, 3), m, have a round-off above _STRAIN times the edge
-    of its tets.
+    """Return a warning for each part whose coordinates ``x`` (n, 3), m, have a round-off above _STRAIN times the length
+    of an edge of its tets.
 
-    The round-off of a coordinate X is up to 2^-53 X, and the edges of a tet of volume V are about (6 V)^(1/3) long.
+    The round-off of a coordinate X is up to 2^-53 X. The edges of a tet of volume V are about (6 V)^(1/3) long.
     """
     warnings = []
     for index in np.unique(part).tolist():

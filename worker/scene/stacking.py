@@ -23,7 +23,7 @@ from .setting import turned
 
 @dataclass
 class Stacked:
-    """All nodes and tets of a case."""
+    """Table of all nodes and tets of a case."""
 
     points: Floats
     """(n, 3) positions after the rotation of their part, m."""
@@ -31,25 +31,25 @@ class Stacked:
     """(m, 4) indices of the nodes of each tet."""
     tet_part: Indices
     node_part: Indices
-    """(n,) part of each node. A node of several parts has the first of its parts."""
+    """(n,) part of each node. For a node of several parts it is the first of these parts."""
     body: Indices
     """(n,) the body of each node. A body is a part, a piece of a part, or several parts and pieces joined by bonds."""
     part_of_body: Ints
-    """(bodies,) the first part of each body. The array also has entries for bodies that were joined to another body."""
+    """(bodies,) the first part of each body. The array also has entries of bodies that were joined to another body."""
     stands: Ints
     """(bodies,) the body to which each body was joined; the body itself if it was not joined."""
     across: Indices
     """(m, 4) neighbours of the faces of each tet (state.Block.across); (0, 4) if no stage needs the neighbours."""
     warnings: list[str]
     read: dict[int, tuple[TetMesh, Ints]]
-    """Meshes from files, keyed by part number, with the global indices of their nodes; empty if the case refers to no
-    set."""
+    """Dictionary from part numbers to pairs: a mesh from a file, and the global indices of its nodes. The dictionary is
+    empty if the case refers to no set."""
 
     def any_of_body(self, allowed: Flags) -> Flags:
-        """Return (bodies, bodies) whether two bodies can be in contact.
+        """Return (bodies, bodies) True for each pair of bodies that can be in contact.
 
-        ``allowed``: (bodies, bodies) whether the parts of two bodies can be in contact. A joined body can be in contact
-        with every body with which one of its parts can be in contact.
+        ``allowed`` (bodies, bodies): True for each pair of bodies whose parts can be in contact. A joined body can be
+        in contact with every body with which one of its parts can be in contact.
         """
         met, (one, other) = np.zeros_like(allowed), np.nonzero(allowed)
         met[self.stands[one], self.stands[other]] = True
@@ -57,10 +57,10 @@ class Stacked:
 
 
 def stacked(case: Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool) -> Stacked:
-    """Return one mesh made of all ``meshes``, in their order; each is given with its part number. Raises MeshError,
-    InputError.
+    """Return one mesh made from all ``meshes``, in their order. Each mesh is given with its part number. Raises
+    MeshError, InputError.
 
-    ``overlaps``: whether overlaps between pieces of a part are searched for.
+    ``overlaps``: True if the function searches for overlaps between pieces of a part.
     """
     points, tets, tet_part, node_part, warnings = [], [], [], [], list[str]()
     bodies, part_of_body, placed, n = [], list[int](), dict[int, Placed](), 0
@@ -94,7 +94,7 @@ def stacked(case: Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool) -
 
 
 def _join(made: Stacked, stands: Ints) -> bool:
-    """Merge nodes; return whether any nodes were merged. ``stands`` (n,): the node that replaces each node."""
+    """Merge nodes. Return True if any nodes were merged. ``stands`` (n,): the node that replaces each node."""
     kept = np.flatnonzero(stands == np.arange(len(stands)))
     if len(kept) == len(stands):
         return False

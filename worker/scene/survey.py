@@ -1,8 +1,8 @@
 """Measurements of the mesh files of a case: ``python -m conoid.worker.scene.survey``.
 
 The process reads one question from standard input and writes one answer to standard output
-(conoid.cases.reading.survey). Child processes read the mesh files, with the limits of a run, and store the meshes in
-the cache of a run. Therefore a run does not read the files again.
+(conoid.cases.reading.survey). Child processes read the mesh files, with the same limits as a run, and store the meshes
+in the cache that runs use. Therefore a run does not read the files again.
 """
 
 import sys
@@ -31,7 +31,7 @@ def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
     """Read the mesh files of all parts and report the errors of each file.
 
     If all files can be used, start a trial run with the meshes, up to its first step. If kernels are not ``compiled``,
-    overlaps of bodies are not searched for.
+    the trial run does not search for overlaps of bodies.
     """
     facts, refused, placed, meshes = Facts(case), list[str](), list[Placed](), dict[int, TetMesh]()
     for index, part in enumerate(case.parts):
@@ -61,8 +61,8 @@ def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
 
 
 def _made(case: Case, index: int, folder: Path, there: dict[int, TetMesh]) -> dict[int, TetMesh]:
-    """Return the meshes of part ``index`` and of the parts meshed together with it, keyed by part number. Return no
-    mesh if ``there`` already has the part.
+    """Return a dictionary from part numbers to meshes: part ``index``, and the parts meshed together with it. The
+    dictionary is empty if ``there`` already has the part.
     """
     if index in there:
         return {}

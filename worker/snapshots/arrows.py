@@ -1,4 +1,4 @@
-"""Velocity arrows in a snapshot. The arrows are at a few triangles that are spread evenly over the outline."""
+"""Velocity arrows in a snapshot. The arrows start at a few triangles that are distributed evenly over the outline."""
 
 import numpy as np
 
@@ -6,19 +6,19 @@ from ..model.state import Floats, Ints
 from .outline import Outline
 
 _MOST = 1000
-"""Largest number of arrows in a snapshot; chosen value: more arrows would hide the body."""
+"""Largest number of arrows in a snapshot. Chosen value: more arrows would hide the body."""
 MOST_BYTES = _MOST * (4 + 3 * 4)
 _LEVELS = 6
-"""Level of the finest grid that is tried. This grid has 2^6 cells along the longest side; the coarsest grid has one
-cell."""
+"""Level of the finest grid that is tried. The finest grid has 2^6 cells along the longest side; the coarsest grid has
+one cell."""
 
 
 def chosen(drawn: Outline, velocity: Floats) -> dict[str, "np.ndarray"]:
-    """Return two arrays of a snapshot: triangles with an arrow, and their velocities. ``velocity`` (m, 3): velocity of
-    each triangle, m/s.
+    """Return two arrays of a snapshot: the triangles with an arrow, and the velocities of these triangles. ``velocity``
+    (m, 3): velocity of each triangle, m/s.
 
-    In each cell of a grid the first triangle gets an arrow. The grid is the finest grid with at most ``_MOST`` occupied
-    cells.
+    The first triangle in each cell of a grid gets an arrow. The function uses the finest grid with at most ``_MOST``
+    occupied cells.
     """
     rows = np.zeros(0, np.int64)
     if len(drawn.tet):

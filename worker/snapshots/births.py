@@ -1,4 +1,6 @@
-"""Times at which fragments were formed. The times are read from the genealogy, which the frames of a run record."""
+"""Times at which fragments were formed. The times are read from the genealogy of the fragments, to which each frame of
+a run adds lines.
+"""
 
 from pathlib import Path
 
@@ -22,8 +24,8 @@ class Births:
         """Return (g,) the times, s, at which fragments ``numbers`` were formed.
 
         The time of a fragment is that of the first frame up to time ``t`` that contains it, or ``t`` if there is no
-        such frame. The ``initial`` fragments have the time 0. ``kept``: whether the run records fragments; if not, the
-        time of all other fragments is NaN.
+        such frame. The ``initial`` fragments have the time 0. ``kept``: True if the run records fragments. If ``kept``
+        is False, the time of all other fragments is NaN.
         """
         if not kept:
             return np.where(numbers < initial, 0.0, np.nan)

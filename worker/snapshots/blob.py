@@ -22,7 +22,7 @@ from .share import Whole
 _VERTEX, _TRIANGLE = 6 + 4, 12 + 2 + 1
 """Number of bytes of a vertex, and number of bytes of a triangle without its fields."""
 _HEADER = 200
-"""Largest number of bytes that an array takes in the header and in padding."""
+"""Largest number of bytes that one array adds to the header and to the padding."""
 UNITS = {
     "speed": "m/s", "broken_faces": "", "plastic_strain": "", "temperature": "K", "damage": "", "mises": "Pa",
     "pressure": "Pa", "principal_stress": "Pa",
@@ -45,11 +45,12 @@ class Budget:
 
 @dataclass(frozen=True)
 class Made:
-    """A snapshot, and the other fields of its line in the journal."""
+    """Snapshot, and the other fields of its line in the journal."""
 
     data: bytes
     tets: bytes
-    """All tets for sections, packed; empty if there are no tets, or more than ``volume.MOST_TETS``."""
+    """All tets for sections, in packed form. The packed data is empty if there are no tets, or more than
+    ``volume.MOST_TETS``."""
     triangles: int
     fragments: int
     smallest: int
@@ -60,7 +61,7 @@ class Made:
 
 
 Births = Callable[[Ints], Floats]
-"""Callback that returns (g,) times of birth, s, of the fragments with the given numbers."""
+"""Callback that returns (g,) times, s, at which the fragments with the given numbers were formed."""
 
 
 def made(whole: Whole, stamp: dict[str, Any], births: Births, budget: Budget) -> Made:
@@ -95,9 +96,9 @@ def made(whole: Whole, stamp: dict[str, Any], births: Births, budget: Budget) ->
 def _numbers(whole: Whole, labels: Ints) -> Ints:
     """Return (tets,) the number of the fragment of each tet.
 
-    If only erosion can separate bodies, there is no record of fragments. In that case the largest piece of each part
-    has the number of the part; the number of every other piece is the number of parts plus the index of the first tet
-    of the piece.
+    If only erosion can separate bodies, there is no record of fragments. In a case without such a record, the largest
+    piece of each part has the number of the part; the number of every other piece is the number of parts plus the index
+    of the first tet of the piece.
     """
     if whole.initial:
         return numbered(whole.numbers, labels, whole.next, SerialComm())[0]
@@ -140,7 +141,7 @@ def _levels(of: dict[str, Floats]) -> tuple[dict[str, Field], dict[str, "np.ndar
 
 
 def _ranges(of: dict[str, Floats]) -> dict[str, list[float]]:
-    """Return the statistics of the fields for ``Made.fields``."""
+    """Return the statistics of the fields, for the attribute ``Made.fields``."""
     known = {name: values[np.isfinite(values)] for name, values in of.items()}
     return {name: np.percentile(values, _PERCENTILES).tolist() for name, values in known.items() if len(values)}
 
@@ -193,7 +194,7 @@ def _in_box(points: Floats, box: Any) -> "np.ndarray":
 
 
 def _in_bits(values: Floats) -> tuple[float, float, "np.ndarray"]:
-    """Return the lowest and the highest of the values (m,), and the values as uint8 levels between these two."""
+    """Return the lowest value, the highest value, and the values (m,) as uint8 levels between these two."""
     low, high = float(values.min(initial=np.inf)), float(values.max(initial=-np.inf))
     if not low < high:
         return (low, low, np.zeros(len(values), np.uint8)) if len(values) else (0.0, 0.0, np.zeros(0, np.uint8))

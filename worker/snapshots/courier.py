@@ -1,5 +1,5 @@
-"""Side thread of a rank (courier); it writes the copied state of the rank to disk. On rank 0 the side thread also sends
-tasks to the packer, the process that makes snapshots from the copies of all ranks.
+"""Side thread of a rank (courier), which writes the copied state of the rank to disk. On rank 0 the side thread also
+sends tasks to the packer, which is the process that makes snapshots from the copies of all ranks.
 """
 
 import contextlib
@@ -22,15 +22,15 @@ from . import share
 from .share import Share
 
 _FAREWELL = 30.0
-"""Longest time for which the last snapshots are awaited after the last step, s; chosen value: a hundred times the
-duration of one snapshot of 150,000 tets."""
+"""Longest wait for the last snapshots after the last step, s. Chosen value: a hundred times the time of one snapshot of
+150,000 tets."""
 _SECRETS = ("CONOID_ZENOH_USER", "CONOID_ZENOH_PASSWORD")
 
 log = logging.getLogger("conoid.worker")
 
 
 class Courier:
-    """Queue and thread for the copied state of a rank. The solver never waits for the thread."""
+    """Queue and side thread for the copied state of a rank. The solver never waits for the thread."""
 
     def __init__(self, folder: Path, rank: int) -> None:
         self._folder, self._rank = folder, rank
@@ -38,7 +38,7 @@ class Courier:
         self._packer: subprocess.Popen[str] | None = None
         self._thread: threading.Thread | None = None
         self.answers: deque[tuple[dict[str, Any], bytes]] = deque()
-        """Answers to the tasks, on rank 0. An answer has the fields of the task and the snapshot, or the field
+        """Answers to the tasks, on rank 0. An answer has the fields of the task, and the snapshot or the field
         ``error``."""
         self.under_way = 0
         """Number of tasks that have no answer yet."""
@@ -64,7 +64,7 @@ class Courier:
         self._end()
 
     def _end(self) -> None:
-        """End the packer process. The next task starts another packer process."""
+        """End the packer process. A later task starts another packer process."""
         if self._packer is not None:
             with contextlib.suppress(OSError):
                 self._packer.kill()

@@ -1,7 +1,7 @@
 """Decimation of the outline: vertices in one cell of a grid are merged (Rossignac and Borrel 1993).
 
 The cells for a fragment are at most half as large as the fragment, so that a small fragment keeps a shape while a large
-fragment becomes coarser; fragments with few triangles are unchanged. If there are more fragments than the budget of
+fragment becomes coarser. Fragments with few triangles are not changed. If there are more fragments than the budget of
 triangles allows, the smallest fragments are omitted. All decisions depend on the whole model, not on the number of
 ranks.
 """
@@ -15,16 +15,16 @@ from ..model.state import Floats, Ints
 from .outline import Outline
 
 _FINENESS = 2.0**0.25
-"""Ratio of two successive cell sizes; chosen value: at most a third of the budget of triangles is unused."""
+"""Ratio of two successive cell sizes. Chosen value: at most a third of the budget of triangles is unused."""
 _LEAST = 8
-"""Smallest number of triangles that the budget has for each fragment; chosen value: the number of triangles of two
+"""Number of triangles that the budget has at least for each fragment. Chosen value: the number of triangles of two
 tets."""
 _SIMPLE = 8
 """Largest number of triangles of a fragment that is not decimated. Chosen value."""
 _SIZES = 128
 """Number of cell sizes. The cell size decreases from the whole box to 2^-32 of the box."""
 Fits = Callable[[Outline], bool]
-"""Callback that returns whether an outline is within the budget."""
+"""Callback that returns True if an outline is within the budget."""
 
 
 def to_budget(outline: Outline, mass: Floats, most: int, fits: Fits) -> Outline:
@@ -52,8 +52,8 @@ def to_budget(outline: Outline, mass: Floats, most: int, fits: Fits) -> Outline:
 
 
 def _fewest(outline: Outline, mass: Floats, fits: Fits) -> Outline:
-    """Return the outline for the case that no cells are coarse enough: the number of fragments is halved until the
-    outline is within the budget.
+    """Return the outline if no cells are coarse enough: the number of fragments is halved until the outline is within
+    the budget.
     """
     most = len(np.unique(outline.fragment))
     while most and not fits(outline):
@@ -64,8 +64,8 @@ def _fewest(outline: Outline, mass: Floats, fits: Fits) -> Outline:
 
 
 def _heaviest(mass: Floats, most: int) -> "np.ndarray":
-    """Return (fragments,) whether each fragment is among the heaviest fragments; if several fragments have the same
-    mass, the first of them is chosen.
+    """Return (fragments,) True for each of the heaviest fragments. If several fragments have the same mass, the first
+    of them are chosen.
     """
     chosen = np.zeros(len(mass), bool)
     chosen[np.argsort(-mass, kind="stable")[:most]] = True
@@ -81,8 +81,8 @@ def _extents(outline: Outline, fragments: int) -> Floats:
 
 
 def _level(outline: Outline, longest: float, most: int) -> int:
-    """Return the level of cell size at which the search begins; at this level there are about as many cell faces as the
-    budget has triangles.
+    """Return the level of cell size at which the search starts. At the level where the search starts, the number of
+    cell faces is about equal to the number of triangles in the budget.
     """
     a, b, c = (outline.points[outline.triangles[:, k]] for k in range(3))
     area = float(np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).sum()) / 2.0

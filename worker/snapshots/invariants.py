@@ -6,8 +6,8 @@ from ..model.state import Floats
 
 
 def of(rows: "np.ndarray") -> dict[str, Floats]:
-    """Return the invariants, keyed by name, as arrays (n,), Pa. ``rows`` (7, n): deviatoric stress in the order xx, yy,
-    zz, yz, zx, xy, and the pressure.
+    """Return a dictionary from the name of each invariant to an array (n,), Pa. ``rows`` (7, n): deviatoric stress in
+    the order xx, yy, zz, yz, zx, xy, and the pressure.
 
     The largest principal stress is 2 sqrt(J2/3) cos(a) - p with cos(3a) = (J3/2) (3/J2)^(3/2), 0 <= a <= pi/3 (Malvern
     1969, Introduction to the mechanics of a continuous medium, 3.3).

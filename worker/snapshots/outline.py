@@ -51,9 +51,9 @@ def find(model: Model, fragment: Ints) -> Outline:
 
 
 def _seen(block: Block, known: Ints, fragments: Ints, own: Ints) -> "np.ndarray":
-    """Return (n, 4) whether each face of a block is part of the outline.
+    """Return (n, 4) True for each face of a block that is part of the outline.
 
-    ``fragments``: fragments of the tets with the ids ``known``.
+    ``known``: global ids of tets, ascending; ``fragments``: fragment of each of these tets.
     """
     if not len(block.across):
         return np.asarray(across(block.tets.astype(np.int32)) < 0)

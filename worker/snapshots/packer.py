@@ -2,7 +2,7 @@
 conoid.worker.snapshots.packer FOLDER``.
 
 A separate process is used, because a thread of the solver's process would hold the interpreter lock. The process uses
-idle cores; only for the last snapshot the run waits. Each line on standard input is a task, and each line on standard
+idle cores. The run waits only for the last snapshot. Each line on standard input is a task, and each line on standard
 output is an answer. The process ends when its standard input ends. A snapshot is written under a temporary name,
 flushed to disk and renamed.
 """
@@ -25,13 +25,13 @@ from .births import Births
 
 _NICE, _LOWEST = 10, 19
 """Decrease of the priority of this process, and the lowest priority. With a decrease of 10, a rank on the core of this
-process gets nine times as much CPU time as this process; chosen value: the remaining CPU time is sufficient."""
+process gets nine times as much CPU time as this process. Chosen value: the remaining CPU time is sufficient."""
 _TETS = 256_000_000
 """Approximate limit of the bytes of all tets in all snapshots of a run. Early snapshots use only a part of the limit,
-so that later snapshots are also possible; chosen value: a hundred snapshots of 150,000 tets in 2,900 fragments."""
+so that later snapshots are also possible. Chosen value: a hundred snapshots of 150,000 tets in 2,900 fragments."""
 _PATIENCE = 60.0
-"""Longest time until the share (copied state) of a rank must appear, s; chosen value: many times the duration of
-writing it to a slow disk."""
+"""Longest wait for the share (copied state) of a rank, s. Chosen value: many times the time that a slow disk needs to
+write it."""
 _LOOK = 0.005
 """Interval between two checks for the share (copied state) of a rank, s. Chosen value."""
 

@@ -25,9 +25,9 @@ ROWS = {"plastic_strain": PLASTIC_STRAIN, "temperature": TEMPERATURE, "damage": 
 """Rows of the state of the tets from which fields are made. A block of tets may not have all of the rows."""
 _STRESSES = PRESSURE + 1 - S_XX
 _STRESS = slice(S_XX, PRESSURE + 1)
-"""State rows of the deviatoric stress and of the pressure."""
+"""State rows of the deviatoric stress, and state row of the pressure."""
 Share = dict[str, "np.ndarray"]
-"""Arrays, keyed by name. The names of the arrays of block k begin with ``k.``."""
+"""Dictionary of arrays. The names of the arrays of block k begin with ``k.``."""
 
 
 def copied(
@@ -36,8 +36,8 @@ def copied(
     """Return the share of a rank.
 
     ``held`` (m, 2): ids of the tets of each cohesive facet; ``counting``: parts whose material law has damage;
-    ``numbers``: fragment of each tet in the last frame, one array for each block; ``known``: number of fragments at the
-    start, and next fragment number.
+    ``numbers``: fragment number of each tet in the last frame, one array for each block; ``known``: number of fragments
+    at the start, and next free fragment number.
     """
     nodes = model.nodes
     share = {"nodes": nodes.id.copy(), "x": nodes.x.copy(), "v": nodes.v.copy(), "held": held.copy()}
@@ -90,8 +90,8 @@ class Whole:
     rank: "np.ndarray"
     """(tets,) uint16 rank of each tet."""
     rows: dict[str, Floats]
-    """Arrays (tets,), keyed by name: each state row of ``ROWS`` that some block has, with 0 in other blocks, and the
-    stress invariants."""
+    """Dictionary of arrays (tets,): each state row of ``ROWS`` that at least one block has, with 0 in the other blocks;
+    and the stress invariants."""
     numbers: Ints
     """(tets,) number of the fragment of each tet in the last frame."""
     initial: int
@@ -102,8 +102,8 @@ class Whole:
 
 
 def joined(shares: Sequence[Share], parts: list[str]) -> Whole:
-    """Return the model that is made from the shares of all ranks; the first share is that of rank 0. If a node is on
-    several ranks, its state is read from the first of these ranks.
+    """Return the model, made from the shares of all ranks. The first share is that of rank 0. If a node is on several
+    ranks, its state is read from the first of these ranks.
     """
     ids, first = np.unique(np.concatenate([share["nodes"] for share in shares]), return_index=True)
     x, v = (np.concatenate([share[name] for share in shares])[first] for name in ("x", "v"))
@@ -130,7 +130,7 @@ def joined(shares: Sequence[Share], parts: list[str]) -> Whole:
 
 
 def _block(shares: Sequence[Share], part: int, ids: Ints) -> tuple[Block, dict[str, "np.ndarray"]]:
-    """Return the tets of a part, ordered by id, and their columns."""
+    """Return the tets of a part and their columns. The tets are ordered by global id."""
     found = [
         (rank, {name.partition(".")[2]: share[name] for name in share if name.startswith(f"{k}.")}, share["nodes"])
         for rank, share in enumerate(shares)

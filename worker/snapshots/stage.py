@@ -1,8 +1,8 @@
 """Schedule of the snapshots.
 
-For a snapshot the solver only copies its data (``share``); a side thread writes the copy (``courier``). All ranks make
-the copy between the same two halves of a step, where frames are written. Rank 0 requests the copy in the reduction of
-the previous step.
+For a snapshot the solver only copies its data (share.py). A side thread writes the copy (courier.py). All ranks make
+the copy between the two halves of the same step, where frames are also written. Rank 0 requests the copy in the
+reduction of the previous step.
 """
 
 import math
@@ -24,30 +24,30 @@ from .courier import Courier
 from .share import copied
 
 _APART = 1.0
-"""Smallest wall time between two scheduled snapshots, s; chosen value: users do not need more frequent snapshots."""
+"""Smallest wall time between two scheduled snapshots, s. Chosen value: users do not need more frequent snapshots."""
 _SHARE = 1.0 / 200.0
 """Fraction of the time of a run that copies may take."""
 _CROWDED = 1.0 / 20.0
 """Fraction of a core that the process that makes snapshots may use, if ranks use all cores. All ranks wait for the rank
-on the core of this process; chosen value: a run takes at most a twentieth longer, and a body of 150,000 tets still has
+on the core of this process. Chosen value: a run takes at most a twentieth longer, and a body of 150,000 tets still has
 a snapshot every 6 s."""
 
 _EARLY = 1e-6
-"""Largest time by which a snapshot may be early, divided by the time between two snapshots; the value is far above
-round-off."""
+"""Largest time by which a snapshot may be early, divided by the time between two snapshots. The largest time is far
+above round-off."""
 
 
 class Snapshots:
-    """The snapshots of a run; ``journal``: None on all ranks except 0."""
+    """Snapshots of a run. ``journal``: None on all ranks except 0."""
 
     def __init__(self, sim: Simulation, folder: Path, journal: Journal | None) -> None:
-        """Start with the number that follows the last snapshot in the journal. Collective."""
+        """Start with the number that follows that of the last snapshot in the journal. Collective."""
         self._folder, self._journal, self._case, self._comm = folder, journal, sim.case, sim.comm
         self._n: int = sim.comm.broadcast(journal.snapshots if journal is not None else 0)
         self._courier = Courier(folder, sim.comm.rank)
         self.next_time = math.inf
-        """Simulated time before which no snapshot is scheduled, s; this time does not limit snapshots that a user
-        requests."""
+        """Simulated time before which no snapshot is scheduled, s. A user may request snapshots before the scheduled
+        time."""
         self._wait(self._place(sim.clock) + 1)
         self._taken = self._took = self._packed = 0.0
         self._crowded = len(os.sched_getaffinity(0)) <= sim.comm.size
@@ -61,7 +61,7 @@ class Snapshots:
     def due(self, clock: Clock, now: float, *, look: bool) -> bool:
         """Return whether a snapshot of the next state must be made; only rank 0 calls this method.
 
-        ``look``: whether to check for a request of a user.
+        ``look``: True to check for a request of a user.
         """
         self._asked_for = self._asked_for or (look and (self._folder / layout.SNAPSHOT_REQUEST).exists())
         if self._courier.under_way:
@@ -71,7 +71,7 @@ class Snapshots:
 
     @property
     def asked_for(self) -> bool:
-        """Whether a snapshot is requested and not yet made."""
+        """True if a snapshot is requested and not yet made."""
         return self._asked_for
 
     def look(self, sim: Simulation, *, due: bool, ending: bool) -> None:
@@ -120,8 +120,8 @@ class Snapshots:
         self._comm.await_all()
 
     def _wait(self, place: int) -> None:
-        """Set the number of the next of the evenly spaced times; set also the time at which this is tested, which is
-        slightly earlier.
+        """Set the number of the next of the evenly spaced times of snapshots. Also set the simulated time at which the
+        step is compared with the time of the snapshot, which is slightly earlier.
         """
         self._next = place
         run = self._case.run
@@ -129,7 +129,7 @@ class Snapshots:
             self.next_time = (place - _EARLY) / run.snapshots * run.end_time
 
     def _place(self, clock: Clock) -> int:
-        """Return how many of the evenly spaced times have been reached."""
+        """Return the number of evenly spaced times of snapshots that have been reached."""
         run = self._case.run
         return math.floor(clock.t / run.end_time * run.snapshots) if run.snapshots else -1
 
@@ -155,13 +155,13 @@ def pause(copying: float, packing: float, *, crowded: bool) -> float:
     """Return the wall time between two snapshots, s.
 
     ``copying``: wall time of the last copy in the solver, s; ``packing``: CPU time of the process that makes the
-    snapshots, s; ``crowded``: whether no core is free for this process.
+    snapshots, s; ``crowded``: True if no core is free for this process.
     """
     return max(_APART, copying / _SHARE, packing / _CROWDED if crowded else 0.0)
 
 
 def _clear(folder: Path, n: int) -> None:
-    """Remove files of a killed worker. Remove also snapshots with numbers from ``n`` on, which are not in the
+    """Remove files of a killed worker. Also remove snapshots with numbers from ``n`` on, which are not in the
     journal.
     """
     place = folder / layout.SNAPSHOTS

@@ -1,5 +1,5 @@
-"""Table of the fragments in a snapshot. The heaviest fragments come first and have a row each; all other fragments
-share one row.
+"""Table of the fragments in a snapshot. The heaviest fragments come first, and each of them has its own row. All other
+fragments share one row.
 """
 
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from ..parallel.comm import SerialComm
 from .share import Whole
 
 MOST_ROWS = 2048
-"""Largest number of fragments that have a row of their own in the table; chosen value: these rows take a tenth of the
-bytes of a snapshot, and a user selects fewer fragments."""
+"""Largest number of fragments that have their own row in the table. Chosen value: these rows take a tenth of the bytes
+of a snapshot, and a user selects fewer fragments."""
 
 
 @dataclass
 class Table:
-    """All fragments of a model, in ascending order of their labels; the values are bit-identical to those of
-    ``fragments.table``.
+    """Table of all fragments of a model, in ascending order of their labels. The values of the fragments are
+    bit-identical to those of ``fragments.table``.
     """
 
     label: Ints
@@ -61,8 +61,8 @@ def measured(whole: Whole, labels: Ints) -> Table:
 
 
 def columns(table: Table, birth: Floats) -> tuple[dict[str, "np.ndarray"], Ints]:
-    """Return the arrays of a snapshot for the table, and (g,) the row of each fragment. ``birth`` (g,): time of birth,
-    s.
+    """Return the arrays of a snapshot for the table, and (g,) the row of each fragment. ``birth`` (g,): time at which
+    each fragment was formed, s.
     """
     order = np.argsort(-table.mass, kind="stable")
     listed, rest = order[:MOST_ROWS], order[MOST_ROWS:]
@@ -82,7 +82,9 @@ def columns(table: Table, birth: Floats) -> tuple[dict[str, "np.ndarray"], Ints]
 
 
 def _rest(table: Table, rest: Ints) -> dict[str, "np.ndarray"]:
-    """Return the one row for all fragments ``rest``. The row has sums and means, but no size and no time of birth."""
+    """Return the one row for all fragments ``rest``. The row has sums and means, but no size and no time of
+    formation.
+    """
     mass = table.mass[rest]
     total = mass.sum()
     return {
@@ -96,8 +98,8 @@ def _rest(table: Table, rest: Ints) -> dict[str, "np.ndarray"]:
 def by_size(size: Floats) -> tuple[int, list[int]]:
     """Return a histogram of the sizes ``size`` (g,), m, of fragments: a first number k, and counts.
 
-    Count i is the number of fragments with sizes from 2^((k+i)/2) m up to the next bound; fragments without extent are
-    omitted.
+    Count i is the number of fragments with sizes from 2^((k+i)/2) m up to the next bound, 2^((k+i+1)/2) m. Fragments
+    without extent are omitted.
     """
     steps = np.floor(2.0 * np.log2(size[size > 0.0])).astype(np.int64)
     if not len(steps):

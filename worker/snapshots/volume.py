@@ -1,4 +1,4 @@
-"""All tets of a model in few bytes, for sections. The layout is that of a snapshot (cases/output/snapshot.py).
+"""All tets of a model, stored in few bytes, for sections. The layout is that of a snapshot (cases/output/snapshot.py).
 
 Nodes are in the order of a Z-curve through the box (Morton 1966). The four nodes of a tet are ascending, and the tets
 are sorted by their nodes. Therefore the differences of successive values are small, and gzip compresses the zeros of
@@ -12,13 +12,13 @@ import numpy as np
 from ..model.state import Floats, Ints
 
 MOST_TETS = 1_000_000
-"""Largest number of tets of a model for which the file is written; chosen value: a page cuts this number of tets in 20
-ms, and their file is made in 0.9 s of CPU time."""
+"""Largest number of tets of a model for which the file is written. Chosen value: a page cuts a model with the largest
+number of tets in 20 ms, and the file is made in 0.9 s of CPU time."""
 _BITS = 10
-"""Number of bits of a coordinate on the Z-curve; with the chosen value the resolution is finer than meshes of
-``MOST_TETS`` tets."""
+"""Number of bits of a coordinate on the Z-curve. Chosen value: the resolution is finer than meshes of ``MOST_TETS``
+tets."""
 _LEVEL = 1
-"""Compression level of gzip; chosen value: level 6 takes three times as long and saves 5 % of the bytes."""
+"""Compression level of gzip. Chosen value: level 6 takes three times as long and saves 5 % of the bytes."""
 
 
 def ordered(places: "np.ndarray", tets: Ints) -> tuple["np.ndarray", Ints, Ints]:

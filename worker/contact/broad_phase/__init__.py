@@ -1,3 +1,3 @@
-"""Candidate pairs. The modules are the search by cells, the swept filter, reference motions, and the schedule of
-searches.
+"""Candidate pairs of contact. The modules contain the search by cells, the swept filter, reference motions, and the
+schedule of searches.
 """

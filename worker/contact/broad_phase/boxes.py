@@ -14,7 +14,7 @@ from ...parallel.passes import Pass
 from ...parallel.team import TASK, Team
 
 _PRIMITIVES = 1024
-"""Number of primitives in a task; chosen value: a task takes some 30 us, compared with 2 us to start a parallel
+"""Number of primitives in a task. Chosen value: a task takes about 30 us, compared with 2 us to start a parallel
 region."""
 _EVERYWHERE = np.full((1, 2, 3), (((-np.inf,) * 3, (np.inf,) * 3)))
 """Hull that touches every box."""
@@ -27,7 +27,7 @@ class Primitives:
     corners: Indices
     """(n, k) rows of the corner nodes of each primitive."""
     reach: Floats
-    """(n,) reach of each primitive, m: distance from the hull of its corners within which other primitives are
+    """(n,) reach of each primitive, m: distance from the hull of its corners, within which other primitives are
     candidates."""
     some: Indices | None = None
     """(m,) rows of the primitives that are searched; None if all are searched."""
@@ -53,7 +53,7 @@ class Lines(NamedTuple):
     v: Floats
     """(nodes, 3) velocities less the mean velocity, m/s."""
     horizon: float
-    """Time over which the nodes are extrapolated, s."""
+    """Time for which the nodes are extrapolated, s."""
     part: Indices
     """(nodes,) part of each node."""
 
@@ -73,12 +73,12 @@ class Boxes:
         return np.asarray(_hull(self.low, self.high))
 
     def touching(self, hull: Floats) -> Flags:
-        """(n,) whether each box touches a hull."""
+        """(n,) True for each box that touches a hull."""
         return np.asarray(_in_hull(self.low, self.high, hull))
 
 
 class Sought(NamedTuple):
-    """Primitives of one side of a search, with their boxes."""
+    """Primitives of one side of a search, with their bounding boxes."""
 
     low: Floats
     """(m, 3) lowest corners of the boxes of the primitives."""
@@ -165,7 +165,7 @@ def _box(out, reach, lines, allowed, hull, own, some, first, stop):  # type: ign
 
 @njit(TASK, cache=True)
 def _boxes(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``_box``."""
+    """Task: runs ``_box`` for a range of primitives."""
     out, reach, lines, allowed, hull, own, counts, some = _boxed(table)
     k = first // _PRIMITIVES
     counts[k] = _box(out, reach, lines, allowed, hull, own[k], some, first, stop)
@@ -185,7 +185,7 @@ def _pack(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, :, ::1], float64[:, :, :, ::1])", cache=True)
 def _join(hull, own):  # type: ignore[no-untyped-def]
-    """Sets the ``hull`` of each part to the hull that contains the hulls of all tasks."""
+    """Sets the ``hull`` of each part to the smallest box that contains the hulls of all tasks."""
     _clear(hull)
     for k in range(len(own)):
         for q in range(len(hull)):
@@ -200,7 +200,7 @@ def everywhere(parts: int) -> Floats:
 
 
 class Boxing:
-    """Passes that compute the boxes of the primitives of one side of a search."""
+    """Passes that compute the boxes of the primitives on one side of a search."""
 
     def __init__(self, team: Team) -> None:
         self._pass = Pass(team, _boxes, *_BOXED, size=_PRIMITIVES)

@@ -1,10 +1,10 @@
 """Search for the boxes near a box, by a bucket sort with position codes (Oldenburg and Nilsson 1994); no grid is stored
 in memory.
 
-The code of a cell is ix + nx (iy + ny iz) (the paper's eq. 10). Every box is entered under the codes of the cells that
-it touches, and the entries are sorted by a hash of their codes. To find the boxes near a given box, the search reads
-the entries with the codes of the cells of this box. The entries of one code are a short range. The memory is
-proportional to the number of boxes, for any distance between the boxes.
+The code of a cell is ix + nx (iy + ny iz) (the paper's eq. 10). Every box has an entry for each cell that it touches,
+and the entries are sorted by a hash of the codes of the cells. To find the boxes near a given box, the search reads the
+entries with the codes of the cells of this box. The entries of one code are a short range. The memory is proportional
+to the number of boxes, for any distance between the boxes.
 """
 
 from typing import NamedTuple
@@ -20,18 +20,18 @@ from ...parallel.passes import Pass
 from ...parallel.team import TASK, Team
 
 _MOST = 2.0**20
-"""Largest number of cells along an axis; with this number the codes of three axes are far below 2^63."""
+"""Largest number of cells along an axis; with this number, the codes of cells along three axes are far below 2^63."""
 _WIDE = 512
-"""Largest number of cells of a box that is entered in the buckets. A box with more cells is compared with all other
+"""Largest number of cells that a box with entries touches. A box that touches more cells is compared with all other
 boxes."""
 _CURVE_BITS = 12
 """Number of bits of each coordinate in the code of the space-filling curve."""
 _LEAST_BITS = 6
-"""Smallest number of bits of the hash; entries are first sorted by this number of upper bits; then each range of hashes
-is sorted separately."""
+"""Smallest number of bits of the hash. Entries are first sorted by the upper bits of their hash; then each range of
+hashes is sorted separately."""
 _BOXES, _RANGES = 512, 4
 """Number of boxes in a task that enters boxes, and number of ranges of hashes in a task. Chosen values: a task takes
-some 20 us in a search of 10,000 boxes, compared with 2 us to start a parallel region."""
+about 20 us in a search of 10,000 boxes, compared with 2 us to start a parallel region."""
 
 
 class Table(NamedTuple):
@@ -39,7 +39,7 @@ class Table(NamedTuple):
 
     origin: Floats
     inverse: float
-    """Inverse of the edge of a cell, 1/m."""
+    """Inverse of the edge length of a cell, 1/m."""
     shape: Ints
     """(3,) number of cells along each axis."""
     bits: int
@@ -51,7 +51,7 @@ class Table(NamedTuple):
     code: Ints
     """(m,) code of the cell of each entry."""
     wide: Indices
-    """(w,) boxes that touch too many cells; these boxes have no entries."""
+    """(w,) boxes that touch too many cells and therefore have no entries."""
 
 
 class Cells(NamedTuple):
@@ -86,8 +86,9 @@ class Buckets:
         self._scratch = Scratch()
 
     def sort(self, low: Floats, high: Floats, hull: Floats, edge: float) -> Table:
-        """Enters the boxes ``low``, ``high`` (n, 3) into cells. ``hull`` (2, 3): hull of all boxes; ``edge``: edge of a
-        cell, m, which is enlarged if the hull is too large for the codes. The table is valid until the next call.
+        """Enters the boxes ``low``, ``high`` (n, 3) into cells. ``hull`` (2, 3): hull of all boxes; ``edge``: edge
+        length of a cell, m. The function enlarges it if the hull is too large for the codes. The table is valid until
+        the next call.
         """
         n, (least, most) = len(low), hull
         edge = max(edge, float((most - least).max()) / _MOST)
@@ -114,7 +115,7 @@ class Buckets:
 
 @njit("int64(float64, float64, float64, int64)", cache=True)
 def bucket_of(x, origin, inverse, n):  # type: ignore[no-untyped-def]
-    """Index of the cell that contains a coordinate along an axis, clamped to 0 ... n - 1."""
+    """Index along an axis of the cell that contains a coordinate, limited to 0 ... n - 1."""
     return np.int64(min(max(np.floor((x - origin) * inverse), 0.0), n - 1.0))
 
 

@@ -1,5 +1,5 @@
-"""Distances of slots, faces and edges from their reference motions in a step. The distances are computed in passes of
-the threads of a rank.
+"""Distances of slots, faces and edges from their reference motions in a step. The threads of a rank compute the
+distances in passes.
 """
 
 import numpy as np
@@ -35,7 +35,7 @@ def _slots(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _corners(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``reference_motion.largest``."""
+    """Task: runs ``reference_motion.largest`` for a range of faces or edges."""
     out, corners, many, left = _largest(table)
     largest(out, corners, many, left, first, stop)
 
@@ -51,9 +51,9 @@ class Deviation:
     def measure(
         self, motion: ReferenceMotion, x: Floats, v: Floats, faces: Indices, edges: Indices, tracked: Flags
     ) -> float:  # fmt: skip
-        """Sets the distances of slots, faces and edges from their lines, over the step and the time ``motion.beyond``
-        after the step. ``x``, ``v`` (slots, 3): positions, and velocities before contact. Returns the largest distance
-        of the ``tracked`` (slots,) slots from their search lines, m.
+        """Sets the distances of slots, faces and edges from their lines, during the step and during the time
+        ``motion.beyond`` after it. ``x``, ``v`` (slots, 3): positions, and velocities before contact. Returns the
+        largest distance of the ``tracked`` (slots,) slots from their search lines, m.
         """
         strayed = self.of_slots(motion, x, v, tracked)
         self._faces.run(len(faces), motion.faces, faces, 3, motion.short.left)

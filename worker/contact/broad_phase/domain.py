@@ -3,8 +3,8 @@
 The method ``box`` compares bounding boxes (Paik et al.): a face or edge is sent to every rank whose box of nodes and
 edges it touches. The method ``arbitrary`` adds a second exchange (the paper's eqs 5 to 16, in three dimensions): the
 other rank sends the cells of its nodes and edges, and receives only the faces and edges that touch one of these cells.
-Only surface nodes are entered, so every occupied cell is an outside cell, and the paper's test of a cell's neighbours
-is not needed.
+Only surface nodes are entered in cells, so every occupied cell is an outside cell, and the paper's test of a cell's
+neighbours is not needed.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ _NONE = np.zeros(0, np.int64)
 def choose(kind: str, askers: Boxes, things: list[Boxes], edge: float, comm: Comm) -> dict[int, list[Flags]]:
     """Returns, for every other rank that needs some of this rank's ``things``, flags of the needed faces and edges.
 
-    ``askers``: boxes of this rank's nodes and edges; ``edge``: edge of a cell, m, equal on all ranks.
+    ``askers``: boxes of this rank's nodes and edges; ``edge``: edge length of a cell, m, equal on all ranks.
     """
     mine = np.concatenate([askers.hull, np.minimum.reduce([t.hull for t in things])])
     hulls = comm.join(mine.view(np.int64)).view(np.float64).reshape(comm.size, 2, 6)
@@ -44,8 +44,8 @@ def _touching(hull: Floats, hulls: Floats, comm: Comm) -> list[int]:
 def _in_cells(
     near: dict[int, list[Flags]], askers: Boxes, asked: dict[int, Flags], things: list[Boxes], edge: float, comm: Comm
 ) -> dict[int, list[Flags]]:
-    """Keeps the boxes that touch a cell in the list of the other rank. ``asked``: boxes of this rank that are near each
-    rank.
+    """Returns the boxes that touch a cell in the list of the other rank; other boxes are removed. ``asked``: boxes of
+    this rank that are near each rank.
     """
     cells = comm.swap({
         rank: np.sort(_cells(askers.low, askers.high, some, edge)) for rank, some in asked.items() if some.any()
@@ -65,7 +65,7 @@ def _cell(x, edge):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64, int64, int64)", cache=True)
 def _code(ix, iy, iz):  # type: ignore[no-untyped-def]
-    """Returns the code of a cell; two cells have equal codes only if they are 2^20 cells apart. The only effect of
+    """Returns the code of a cell. Two cells have equal codes only if they are 2^20 cells apart. The only effect of
     equal codes is that an unneeded ghost is sent.
     """
     return (ix << 42) + (iy << 21) + iz
@@ -100,8 +100,9 @@ def _cells(low, high, some, edge):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[::1], boolean[::1], int64, int64)", cache=True)
 def _place(codes, used, code, bits):  # type: ignore[no-untyped-def]
-    """Position of a code in a hash table of 2^bits entries; if the code is missing, the position of the free entry for
-    it. The search begins at the entry of the hash of the code and ends at the first entry that is free or has the code.
+    """Position of a code in a hash table of 2^bits entries. If the code is missing, the result is the position of the
+    free entry for it. The search begins at the entry of the hash of the code, and ends at the first entry that is free
+    or has the code.
     """
     at = bucket_at(code, bits)
     while used[at] and codes[at] != code:

@@ -1,9 +1,10 @@
 """Velocities with which a search extrapolates the nodes.
 
 A node of a metal is extrapolated with its own velocity. Nodes of a body that breaks vibrate: a free tet has a period of
-some ten steps, and the release of a stress of 1 GPa in glass makes the tet vibrate with sigma / (rho c) = 75 m/s. With
-this velocity the extrapolation to the next search would have an error above the motion of the node. Therefore a node
-whose tets may break gets the velocity of a rigid body with the momentum and the angular momentum of its tets.
+about ten steps, and the release of a stress of 1 GPa in glass makes the tet vibrate with sigma / (rho c) = 75 m/s. With
+the velocity of such a vibration, the extrapolation of a node to the next search would have an error that is larger than
+the motion of the node. Therefore a node whose tets may break gets the velocity of a rigid body with the momentum and
+the angular momentum of its tets.
 """
 
 import numpy as np
@@ -18,7 +19,7 @@ from ...parallel.tags import Tag
 from ...parallel.team import TASK, Team
 
 _QUANTA = 2.0**16
-"""Number of quanta per m/s; with this value sums up to 1e14 m/s do not overflow."""
+"""Number of quanta per m/s; with this number, sums of velocities up to 1e14 m/s do not overflow."""
 _THIN = 1e-9
 """Smallest determinant of the inertia of a tet, divided by the cube of its trace. For a smaller value the rotation of
 the tet is not computed."""
@@ -47,7 +48,7 @@ def rigid_motions(team: Team) -> TetPass:
 
 @njit("float64(float64[::1], float64[::1], float64[::1])", cache=True)
 def _det(a, b, c):  # type: ignore[no-untyped-def]
-    """Triple product a . b x c of three vectors (3,)."""
+    """Triple product (a x b) . c of three vectors (3,)."""
     return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
 
 

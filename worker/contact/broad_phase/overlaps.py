@@ -13,10 +13,10 @@ from .boxes import SOUGHT, Sought
 from .buckets import TABLE, Table, bucket_at, bucket_of
 
 _LARGE = 128
-"""Number of large primitives in a task; chosen value: a task takes some 30 us, compared with 2 us to start a parallel
+"""Number of large primitives in a task. Chosen value: a task takes about 30 us, compared with 2 us to start a parallel
 region."""
 _EACH, _MOST = 8, 64
-"""Number of pairs for each large primitive for which memory is first reserved, on average over a task; and the largest
+"""Number of pairs for which memory is first reserved, for each large primitive, as a mean over a task; and largest
 number of pairs of a large primitive."""
 _I, _B2, _N1, _N2, _I1 = (
     types.int64, types.boolean[:, ::1], types.int32[::1], types.int32[:, ::1], types.int64[::1],
@@ -30,7 +30,9 @@ _NO_PAIRS, _NOWHERE = np.zeros((0, 2), np.int32), np.zeros(0, np.int64)
 
 @njit("boolean(int32[:, ::1], int64, int32[:, ::1], int64, int64, int64)", cache=True)
 def _meet(small, few, large, many, i, j):  # type: ignore[no-untyped-def]
-    """Returns True if two primitives have a common corner. The primitives have ``few`` and ``many`` corners."""
+    """Returns True if two primitives have a common corner. ``few`` and ``many``: numbers of corners of the two
+    primitives.
+    """
     for a in range(few):
         for b in range(many):
             if small[i, a] == large[j, b]:
@@ -116,7 +118,7 @@ def _pairs(arguments, first, stop, thread):  # type: ignore[no-untyped-def]
 
     In the first pass there are no places in ``out``; the task counts the pairs and writes them to ``found``, which has
     memory for ``each`` pairs of a large primitive. In the second pass the task copies its pairs to their places, which
-    begin at ``begins``; if ``found`` was too small, the task finds the pairs again.
+    begin at ``begins``. If ``found`` was too small, the task finds the pairs again.
     """
     out, begins, found, each, counts, table, small, large, rank, part, allowed = _read(arguments)
     k, room = first // _LARGE, each * first

@@ -1,9 +1,9 @@
 """Tables of candidate pairs, and the condition under which a pair is not tested.
 
 A list of candidates is used for many steps, and in most steps most pairs are far apart. Every slot has a reference
-motion on a straight line; ``left`` is the distance of the slot from this line in the next step (the larger of the
-distances at the beginning and at the end of the step, without contact). If the test of a pair shows that its distance
-is larger than the distance of contact by ``slack``, the pair is not tested again as long as
+motion on a straight line; ``left`` is the distance of the slot from this line in the next step. This distance is the
+larger one of the distances at the beginning and at the end of the step, without contact. If the test of a pair shows
+that its distance is larger than the distance of contact by ``slack``, the pair is not tested again as long as
 
     slack > U t + left_1 + left_2 (now) + left_1 + left_2 (when it was tested),
 
@@ -26,7 +26,7 @@ from ..narrow_phase.node_face import chain
 from ..narrow_phase.tables import Pairs
 
 _FRESH = {"until": -np.inf, "speed": np.nan, "turned": False, "kept": 0.0, "next": -1}
-"""Initial values of a pair; with these values the pair is tested in the next step."""
+"""Initial values of a pair, with which the pair is tested in the next step."""
 
 
 @dataclass
@@ -38,8 +38,8 @@ class PairTable:
     speed: Floats = field(default_factory=lambda: np.zeros(0))
     turned: Flags = field(default_factory=lambda: np.zeros(0, bool))
     kept: Floats = field(default_factory=lambda: np.zeros((0, 4)))
-    """(p, 4) stored impulse of each pair in the last step times its row norm, m/s: along the normal, and across it. The
-    values are zero if the pair was not active."""
+    """(p, 4) stored impulse of each pair in the last step, multiplied by its row norm, m/s: along the normal, and
+    across it. The stored impulse is zero if the pair was not active."""
     next: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     _active: Indices = field(default_factory=lambda: np.zeros(0, np.int32), init=False, repr=False)
     _tested: tuple[Indices, Ints, Ints] | None = field(default=None, init=False, repr=False)
@@ -50,12 +50,12 @@ class PairTable:
         return len(self.rows)
 
     def add(self, rows: Indices) -> None:
-        """Adds pairs. The added pairs are tested in the next step."""
+        """Adds pairs to the table. The added pairs are tested in the next step."""
         if len(rows):
             self._rooms.append(self, len(rows), rows=rows, **_FRESH)
 
     def take_tested(self, active: Indices, begins: Ints, counts: Ints) -> None:
-        """Stores which pairs the tasks have tested. The pairs of a task are the ``counts`` entries of ``active`` from
+        """Stores which pairs the tasks have tested. The pairs of a task are ``counts`` elements of ``active``, from
         ``begins`` on.
         """
         self._tested = active, begins, counts
@@ -93,8 +93,9 @@ class PairTable:
         _recall(self.kept, first, self.next, self.rows, rows, kept)
 
     def carried(self, one: Indices, two: Indices) -> "PairTable":
-        """Returns the pairs with new numbers of their members: ``one`` and ``two``, -1 for a removed member. The pairs
-        are ordered by the first member, so that successive pairs in a kernel have common data.
+        """Returns the pairs after a change of the numbers of their members. ``one`` and ``two``: new numbers, -1 for a
+        removed member. The pairs are ordered by the first member, so that successive pairs in a kernel have common
+        data.
         """
         some, rows = _renumbered(self.rows, one, two, int(one.max(initial=-1)) + 1)
         return PairTable(
@@ -102,7 +103,9 @@ class PairTable:
         )
 
     def wake(self) -> None:
-        """Schedules all pairs for a test. Necessary after a change of the short lines and mean normals."""
+        """Schedules all pairs for a test; the call is necessary after a change of the short lines and the mean
+        normals.
+        """
         some = ~np.isposinf(self.until)
         self.until[some], self.speed[some] = -np.inf, np.nan
 
@@ -136,8 +139,8 @@ def _recall(kept, first, following, pairs, rows, values):  # type: ignore[no-unt
 
 @njit("Tuple((int64[::1], int32[:, ::1]))(int32[:, ::1], int32[::1], int32[::1], int64)", cache=True)
 def _renumbered(pairs, one, two, n):  # type: ignore[no-untyped-def]
-    """Returns the rows of ``pairs`` (p, 2) whose two members have new numbers in ``one`` and ``two``, and the new
-    numbers. The rows have the order of the new number of the first member, which is below ``n``.
+    """Returns the rows of ``pairs`` (p, 2) whose two members still exist, and the new numbers of these members. ``one``
+    and ``two``: new numbers. The rows have the order of the new number of the first member, which is below ``n``.
     """
     begin = np.zeros(n + 1, np.int64)
     for p in range(len(pairs)):

@@ -1,13 +1,14 @@
-"""Reference motions: the straight lines along which slots are extrapolated, and the distances of the slots from them.
+"""Reference motions: the straight lines along which slots are extrapolated, and the distances of the slots from these
+lines.
 
-A search extrapolates every slot along a straight line. A pair that the search excludes can be active only if a slot
-departs from its line by half of the skin. A slot that departs so far gets a new line and is registered again
+A search extrapolates every slot along a straight line. If the search excludes a pair, the pair can be active only after
+a slot departs from its line by half of the skin. A slot that departs so far gets a new line and is registered again
 (registration.py). The new line begins at the present position of the slot, with the mean velocity of the slot since the
 last line.
 
-The time for which a pair is not tested is measured from other lines, the short lines, which all slots get every few
-steps. A short line has the mean velocity of these steps, so it is much closer to the slot than the line of the search.
-A new short line needs no registration (pairs.py).
+The time for which a pair is not tested is measured from other lines, the short lines. All slots get new short lines
+every few steps. A short line has the mean velocity of the slot in the last few steps, so it is much closer to the slot
+than the line of the search. A new short line needs no registration (pairs.py).
 """
 
 from typing import ClassVar
@@ -26,25 +27,25 @@ class Lines:
     """Straight lines along which the slots are extrapolated."""
 
     COLUMNS: ClassVar = {"x": COPIED, "course": COPIED, "since": COPIED, "left": COPIED}
-    """Rules of the columns with one value for each slot (model/columns.py)."""
+    """Rules for new rows of the columns with one value for each slot (model/columns.py)."""
 
     def __init__(self, x: Floats, course: Floats) -> None:
         """Begins the lines at time 0. ``x``, ``course`` (slots, 3): positions, m, and velocities, m/s."""
         self.x, self.course = spacious_copy(x), spacious_copy(course)
         self.since = np.zeros(len(x))
-        """(slots,) time at which each line began, s."""
+        """(slots,) time at which each line began, s after the search."""
         self.left = np.zeros(len(x))
         """(slots,) distance of each slot from its line in the present step, m: the larger of the distances at the
         beginning and at the end of the step."""
 
     def begin_at(self, first: int, x: Floats, course: Floats, t: float) -> None:
-        """Begins the lines of the slots from ``first`` on at time ``t``. ``x``, ``course`` (n, 3): positions and
+        """Begins the lines of the slots from ``first`` on, at the time ``t``. ``x``, ``course`` (n, 3): positions and
         velocities at this time.
         """
         self.x[first:], self.course[first:], self.since[first:] = x - t * course, course, t
 
     def take_over(self, slots: Indices, old: "Lines", t: float) -> None:
-        """Copies the lines of ``old`` at time ``t``. ``slots``: new number of each slot of ``old``, -1 for removed
+        """Copies the lines of ``old`` at the time ``t``. ``slots``: new number of each slot of ``old``, -1 for removed
         slots.
         """
         self.x -= t * self.course
@@ -52,7 +53,9 @@ class Lines:
         _take_over(self.x, self.course, self.since, slots, old.x, old.course, old.since)
 
     def begin_anew(self, some: "np.ndarray", x: Floats, t: float) -> None:
-        """Begins new lines for ``some`` (slots,), at the positions ``x`` (slots, 3) and the time ``t``."""
+        """Begins new lines for the flagged slots ``some`` (slots,), at the positions ``x`` (slots, 3) and the time
+        ``t``.
+        """
         _begin_anew(some, self.x, self.course, self.since, x, t)
 
 
@@ -64,9 +67,10 @@ class ReferenceMotion:
         self.drift = drift
         """(3,) mean velocity of all surface nodes at the search, m/s."""
         self.until = until
-        """Time up to which the candidates are complete, s after the search."""
+        """Time up to which the candidate pairs are complete, s after the search."""
         self.searched, self.short = Lines(x, course), Lines(x, course)
-        """Lines of the search, and short lines. The distances of pairs are measured from the short lines."""
+        """Two kinds of lines: the lines of the search, and the short lines. The bounds of pairs refer to the short
+        lines."""
         self.faces, self.edges = np.zeros(faces), np.zeros(edges)
         """Largest distance of a corner from its short line, m: (f,) for each face, and (e,) for each edge."""
         self.t = 0.0
@@ -74,7 +78,7 @@ class ReferenceMotion:
         self.end = 0.0
         """Time at the end of the step, s after the search."""
         self.beyond = 0.0
-        """Time after the end of the step, s, for which distances are also measured."""
+        """Time after the end of the step for which distances are also measured, s."""
         self.strayed = 0.0
         """Largest distance of a tracked slot from its search line in the step, m."""
 
@@ -98,16 +102,16 @@ class ReferenceMotion:
         self.t, self.end, self.beyond = self.end, self.end + dt, beyond
 
     def farthest(self, some: Flags) -> float:
-        """Largest distance of the slots ``some`` (slots,) from their search lines in the step, m."""
+        """Largest distance of the flagged slots ``some`` (slots,) from their search lines in the step, m."""
         return float(farthest(self.searched.left, some, 0, len(some)))
 
     def begin_anew(self, some: "np.ndarray", x: Floats) -> None:
-        """Begins new search lines for the slots ``some`` (slots,), at the positions ``x`` (slots, 3)."""
+        """Begins new search lines for the flagged slots ``some`` (slots,), at the positions ``x`` (slots, 3)."""
         self.searched.begin_anew(some, x, self.t)
 
     def aim(self, some: "np.ndarray", x: Floats, v: Floats) -> None:
-        """Begins new search lines for slots whose velocity has changed suddenly, ``some`` (slots,). The lines begin at
-        ``x`` with the velocities ``v``."""
+        """Begins new search lines for the flagged slots ``some`` (slots,), whose velocity has changed suddenly. The
+        lines begin at ``x`` with the velocities ``v``."""
         lines = self.searched
         lines.course[some], lines.x[some], lines.since[some] = v[some], (x - self.t * v)[some], self.t
 

@@ -1,7 +1,7 @@
 """Registration: the search for the candidate pairs of changed nodes, faces and edges on one rank, without
-communication; registration finds each pair once.
+communication. Registration finds each pair once.
 
-The pairs of a changed node, face or edge are removed; then pairs of it are searched among all nodes, faces and edges in
+The pairs of a changed node, face or edge are removed; then its pairs are searched among all nodes, faces and edges in
 the broad phase. A node, face or edge counts as changed if it has departed from its line (reference_motion.py) or is new
 on the surface. A complete search is a registration in which all nodes, faces and edges are changed. Candidates that do
 not become active have no effect on the answer.
@@ -23,8 +23,8 @@ from .extrapolation import rigid_motions
 from .swept_filter import SweptFilter
 
 _PARTLY = 0.5
-"""Fraction of half of the skin. When a slot has departed from its line by half of the skin, all slots that have
-departed by more than this fraction of half of the skin also get new lines."""
+"""Fraction of half of the skin. When a slot has departed from its line by half of the skin, new lines begin for all
+slots that have departed by more than this fraction of half of the skin."""
 
 
 class Registration:
@@ -45,8 +45,8 @@ class Registration:
         self._register(scene)
 
     def renew(self, scene: Scene, x: Floats, v: Floats, strayed: bool) -> None:
-        """Registers all new nodes, faces and edges. If ``strayed``, first begins new lines for the slots that have
-        departed from their lines.
+        """Registers all new nodes, faces and edges. If ``strayed`` is True, first begins new lines for the slots that
+        have departed from their lines.
 
         ``x``, ``v`` (slots, 3): positions at the beginning of the step, and velocities before contact.
         """
@@ -94,7 +94,7 @@ class Registration:
                 self._add_faces(scene, np.ascontiguousarray(found[:, ::-1]), lines)
 
     def _add_faces(self, scene: Scene, pairs: Indices, lines: Lines) -> None:
-        """Adds the pairs of slot and face, of ``pairs`` (p, 2), that may be in contact."""
+        """Adds those pairs of a slot and a face that may be in contact. ``pairs`` (p, 2): all pairs."""
         faces = scene.faces
         scene.node_face.add(self._filter.faces(pairs, faces.corners, faces.size, lines, scene.rules.skin))
 
@@ -112,7 +112,7 @@ class Registration:
         self._add_edges(scene, found, lines)
 
     def _add_edges(self, scene: Scene, pairs: Indices, lines: Lines) -> None:
-        """Adds the pairs of edges, of ``pairs`` (p, 2), that this rank computes and that may be in contact."""
+        """Adds those pairs of edges that this rank computes and that may be in contact. ``pairs`` (p, 2): all pairs."""
         edges = scene.edges
         if not edges.own.all():
             pairs = pairs[edges.own[pairs[:, 0]]]
@@ -151,7 +151,7 @@ def carry(now: Scene, old: Scene) -> None:
 
 
 def _numbers(now: Ints, old: Ints) -> Indices:
-    """Returns, for each name of ``old``, its row in ``now``; -1 for a name that is missing in ``now``."""
+    """Returns for each element of ``old`` (names) its row in ``now``; -1 for a name that is missing in ``now``."""
     if (now[1:] > now[:-1]).all() and (old[1:] > old[:-1]).all():
         return np.asarray(_merged(now, old))
     order = np.argsort(now, kind="stable")
@@ -161,7 +161,7 @@ def _numbers(now: Ints, old: Ints) -> Indices:
 
 @njit("int32[::1](int64[::1], int64[::1])", cache=True)
 def _merged(now, old):  # type: ignore[no-untyped-def]
-    """Does the same as ``_numbers`` for ascending names."""
+    """Does the same as ``_numbers``, for names in ascending order."""
     rows, at = np.empty(len(old), np.int32), 0
     for k in range(len(old)):
         while at < len(now) and now[at] < old[k]:

@@ -1,9 +1,9 @@
 """Candidate pairs: nodes and faces, edges and edges, that may be in contact before the next search.
 
-All nodes are extrapolated over a time, the horizon. Two primitives (points, edges or faces) are candidates if their
+All nodes are extrapolated for a time, the horizon. Two primitives (points, edges or faces) are candidates if their
 paths come closer than their reach. A candidate list is valid until the horizon has passed or a node has departed from
-its path by half of the skin, so motion at a constant velocity uses no part of the skin. The list may contain pairs that
-are not needed, but no needed pair is missing.
+its path by half of the skin. Therefore motion at a constant velocity uses no part of the skin. The candidate list may
+contain pairs that never come into contact, but no pair that comes into contact is missing.
 """
 
 import numpy as np
@@ -16,13 +16,13 @@ from .buckets import Buckets
 from .overlaps import Overlaps
 
 _FEW, _SAMPLE = 8, 256
-"""Ratio of the numbers of large and small primitives above which larger cells are faster; and number of sampled boxes
-from which the size of the cells is computed."""
+"""Ratio of the number of large primitives to the number of small primitives, above which larger cells are faster; and
+number of sampled boxes from which the size of the cells is computed."""
 _WORTHWHILE = 1024
-"""Number of primitives of the smaller set; above this number, the primitives that are far from the other set are
+"""Number of primitives in the smaller of the two sets, above which primitives that are far from the other set are
 removed before the search. Chosen value: one task of boxes.py."""
 _ANY = np.zeros(0, np.int64)
-"""Rank of primitives if the order of a pair has no meaning."""
+"""Value of the argument ``rank`` if the order of a pair has no meaning."""
 
 
 class Finder:
@@ -61,7 +61,7 @@ def find(
     """(pairs, 2) candidates: row of the small primitive, and row of the large primitive.
 
     ``x``, ``v``, ``part``: position (nodes, 3), velocity less the mean velocity (nodes, 3), and part (nodes,) of each
-    node. ``allowed`` (parts, parts): pairs of parts that may be in contact. Primitives with a common corner are no
+    node. ``allowed`` (parts, parts): pairs of parts that may be in contact. Two primitives with a common corner are not
     candidates. ``rank`` (large,): if given, the small primitives are the first rows of the large primitives, and a pair
     is found only from its primitive of lower rank. ``finder``: passes of the search; None for one thread.
     """
@@ -76,7 +76,7 @@ def _edge(small: Sought, large: Sought) -> float:
 
 @njit("float64(float64[:, ::1], float64[:, ::1])", cache=True)
 def _extent(low, high):  # type: ignore[no-untyped-def]
-    """Median of the longest sides of the boxes, from a sample, m."""
+    """Median of the longest sides of the boxes, computed from a sample, m."""
     step = max(len(low) // _SAMPLE, 1)
     sides = np.empty(-(-len(low) // step))
     for k in range(len(sides)):

@@ -1,4 +1,6 @@
-"""Searches of all ranks: the schedule and the horizon of searches, and the scene that a search makes."""
+"""Searches of all ranks. The module contains the schedule and the horizon of searches, and the scene that a search
+makes.
+"""
 
 import math
 from functools import cached_property
@@ -29,16 +31,17 @@ from .registration import Registration, carry
 
 _SHORTEST = 10.0
 """Smallest horizon of a search, in steps. The horizon is at most twice the number of steps since the last search, but
-never below this value."""
+never below the smallest horizon."""
 _LONGEST = 80.0
 """Largest horizon of a search, in steps, if bodies break. With a horizon of 300 steps the additional pairs between
-fragments would cost a quarter more than the omitted searches save (docs/performance/bench.md, the bar to 40 us)."""
+fragments would take a quarter more time than the omitted searches save (docs/performance/bench.md, the bar to 40
+us)."""
 _AHEAD = 2.0
-"""Number of steps before the end of the horizon at which the next search is scheduled; the second of these steps is
-needed because the narrow phase also detects the contacts of the step after the present one."""
+"""Number of steps before the end of the horizon at which the next search is scheduled. The value is two, because the
+narrow phase also detects the contacts of the step after the present one."""
 _LEAST = 3.0 + _AHEAD
-"""Smallest remaining horizon, in steps, for which the candidates of the last search are kept. With a shorter horizon
-the next search would follow immediately; chosen value: three steps more than _AHEAD; one of the three allows for a time
+"""Smallest remaining horizon, in steps, with which the candidates of the last search are kept. With a shorter horizon
+the next search would follow immediately. Chosen value: three steps more than _AHEAD. One of the three allows for a time
 step that increases."""
 
 
@@ -49,7 +52,7 @@ class Searches:
         self, case: Case, model: Model, neighbours: list[Neighbour], exterior: Exterior, comm: Comm, clock: Clock,
         registered: Registration,
     ) -> None:  # fmt: skip
-        """Prepares searches. Before the first search there is no scene."""
+        """Creates an object without a scene; the first search makes the scene."""
         self._case, self._model, self._neighbours, self._exterior = case, model, neighbours, exterior
         self._comm, self._clock, self._registered, self._fractures = comm, clock, registered, case.fractures
         self.mu = part_pairs.friction(case)
@@ -62,10 +65,10 @@ class Searches:
         self.many = 0
         """Number of searches so far."""
         self._last = -math.inf
-        """Number of the step of the last complete search."""
+        """Number of the step in which the last complete search was made."""
         self._kept: tuple[Ints, Floats] = np.zeros((0, 2), np.int64), np.zeros((0, 4))
-        """Pairs with their stored impulses, from before a repartition or a restart. The next search assigns the
-        impulses to the new pairs."""
+        """Pairs with their stored impulses, from before a repartition or a restart. The next search assigns the stored
+        impulses to its pairs."""
 
     @cached_property
     def rubs(self) -> bool:
@@ -87,7 +90,7 @@ class Searches:
         )
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the stored impulses of pairs to the ``parcel`` (a checkpoint or migration message); the candidate pairs
+        """Adds the stored impulses of pairs to the ``parcel`` (a checkpoint or migration message). The candidate pairs
         are not added, because a search finds them again.
         """
         keys, kept = self._kept if self.scene is None else self.scene.kept
@@ -115,8 +118,8 @@ class Searches:
         return self._fractures and self._clock.step % AGE == 0
 
     def begin(self, nodes: Nodes) -> None:
-        """Recomputes the mean normals every EVERY steps, and searches if a search is scheduled. This function must be
-        called before a step. Collective.
+        """Recomputes the mean normals every EVERY steps. Makes a search if one is scheduled; to be called before a
+        step. Collective.
         """
         if self._clock.step % normals.EVERY == 0:
             self._exterior.turn()
@@ -152,8 +155,8 @@ class Searches:
         self.many += 1
 
     def _laid_out(self, nodes: Nodes, goes_on: bool) -> Scene:
-        """Makes a scene of the present surface, without pairs. With ``goes_on`` the scene has the remaining horizon of
-        the last complete search, else a new horizon. Collective.
+        """Makes a scene of the present surface, without pairs. If ``goes_on`` is True, the scene has the remaining
+        horizon of the last complete search, else a new horizon. Collective.
         """
         clock, motion = self._clock, self._exterior.motion
         self._exterior.refresh(self._courses(nodes), clock.t)
@@ -180,7 +183,7 @@ class Searches:
 
     def foresee(self, *, anew: bool = False) -> None:
         """Adds the faces of cracks that may open soon to the broad phase of all ranks that have these faces. ``anew``:
-        True after a search, when faces that were already in the broad phase must be added again. Collective.
+        True after a search; then faces that were already in the broad phase must be added again. Collective.
         """
         now, cracks = self.scene, self._exterior.cracks
         if now is None or not self._fractures:
@@ -208,7 +211,7 @@ class Searches:
             follower.share(split, received, self._neighbours)
 
     def pushed(self, nodes: Ints) -> Flags:
-        """(k,) whether each of the local ``nodes`` (k,) had a contact impulse in the last step."""
+        """(k,) True for each of the local ``nodes`` (k,) that had a contact impulse in the last step."""
         if (now := self.scene) is None:
             return np.zeros(len(nodes), bool)
         places = now.own.place[nodes]

@@ -3,9 +3,9 @@
 The box around a face or an edge is much larger than the face or edge. A pair of edges is removed if a single direction
 separates the two edges over the whole horizon. For a node and a face, the height over the face and the distances from
 its sides are computed at the beginning, middle and end of the horizon; each of these distances is nearly a parabola in
-time. Between two of the three moments it deviates from the straight line by an eighth of its second difference; the
-filter allows twice this deviation. A pair is removed only if a single one of the distances excludes contact over the
-whole horizon, with the skin and the depth of contacts as margin.
+time. Between two successive moments it deviates from a straight line by an eighth of its second difference. The filter
+allows twice the deviation from the straight line. A pair is removed only if a single one of the distances excludes
+contact over the whole horizon, with the skin and the depth of contacts as margin.
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ from .boxes import LINES, Lines
 
 _V2 = "float64[:, ::1]"
 _PAIRS = 1024
-"""Number of pairs in a task; chosen value: a task takes some 50 us, compared with 2 us to start a parallel region."""
+"""Number of pairs in a task. Chosen value: a task takes about 50 us, compared with 2 us to start a parallel region."""
 _N2 = types.int32[:, ::1]
 _KEEP = _N2, types.int64[::1], _N2, types.float64[::1], LINES, types.float64
 _read = reader(*_KEEP)
@@ -37,14 +37,14 @@ class SweptFilter:
         self._packing = Packing(team, _PAIRS)
 
     def faces(self, pairs: Indices, places: Indices, size: Floats, lines: Lines, skin: float) -> Indices:
-        """Returns the pairs of a slot and a face, of ``pairs`` (p, 2), that may be in contact. ``places`` (f, 4): slots
-        of each face; ``size`` (f,): size of each face, m. The content of ``pairs`` is overwritten.
+        """Returns the pairs of a slot and a face that may be in contact. ``pairs`` (p, 2): all pairs; its content is
+        overwritten. ``places`` (f, 4): slots of each face; ``size`` (f,): size of each face, m.
         """
         return self._kept(self._faces, pairs, places, size, lines, skin)
 
     def edges(self, pairs: Indices, places: Indices, deep: Floats, lines: Lines, skin: float) -> Indices:
-        """Returns the pairs of edges, of ``pairs`` (p, 2), that may be in contact. ``places`` (e, 6): slots of each
-        edge; ``deep`` (e,): greatest depth of a contact, m. The content of ``pairs`` is overwritten.
+        """Returns the pairs of edges that may be in contact. ``pairs`` (p, 2): all pairs; its content is overwritten.
+        ``places`` (e, 6): slots of each edge; ``deep`` (e,): greatest depth of a contact, m.
         """
         return self._kept(self._edges, pairs, places, deep, lines, skin)
 
@@ -86,7 +86,7 @@ def _over(s, i, j, k):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def _keep_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: moves those of its pairs of slot and face that may be in contact to its first rows."""
+    """Task: moves those of its pairs of a slot and a face that may be in contact to the front of its range."""
     pairs, counts, faces, size, lines, skin = _read(table)
     x, v, part, horizon, n = lines.x, lines.v, lines.part, lines.horizon, first
     half = 0.5 * horizon
@@ -112,16 +112,16 @@ def _keep_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True)
 def _beyond(axis, a, b, c, d, far):  # type: ignore[no-untyped-def]
-    """Returns True if the segment cd is beyond ab in the direction of ``axis`` by more than ``far``."""
+    """Returns True if the segment cd is beyond the segment ab, in the direction of ``axis``, by more than ``far``."""
     one, two = max(dot(axis, a), dot(axis, b)), min(dot(axis, c), dot(axis, d))
     return two - one > far * np.sqrt(dot(axis, axis))
 
 
 @njit(f"boolean({_V2}, {_V2}, int64, int64, int64, int64, float64, float64, float64)", cache=True)
 def _separated(x, v, a, b, c, d, begin, end, far):  # type: ignore[no-untyped-def]
-    """Returns True if the segments ab and cd stay further apart than ``far`` from time ``begin`` to ``end``. The
-    distance is measured along the direction in which the segments are nearest at the middle of this time. On straight
-    lines the distance along a fixed direction is least at the beginning or at the end.
+    """Returns True if the segments ab and cd remain further apart than ``far`` from the time ``begin`` to the time
+    ``end``. The distance is measured along the direction in which the segments are nearest at the middle of this time.
+    On straight lines the distance along a fixed direction is least at the beginning or at the end.
     """
     half = 0.5 * (begin + end)
     axis = nearest(_then(x, v, a, half), _then(x, v, b, half), _then(x, v, c, half), _then(x, v, d, half))
@@ -132,7 +132,7 @@ def _separated(x, v, a, b, c, d, begin, end, far):  # type: ignore[no-untyped-de
 
 @njit(TASK, cache=True, error_model="numpy")
 def _keep_edges(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: moves those of its pairs of edges that may be in contact to its first rows."""
+    """Task: moves those of its pairs of edges that may be in contact to the front of its range."""
     pairs, counts, edges, deep, lines, skin = _read(table)
     x, v, horizon, n = lines.x, lines.v, lines.horizon, first
     half = 0.5 * horizon

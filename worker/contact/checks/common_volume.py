@@ -154,7 +154,7 @@ def _determinant(tet):  # type: ignore[no-untyped-def]
 @njit("float64(float64[:, :], int64, float64[:, :], int64)", cache=True)
 def _height(tet, face, other, k):  # type: ignore[no-untyped-def]
     """Returns the result of ``_triple`` for corner ``k`` of the tet ``other`` and the face of a tet that is opposite to
-    one of its corners. The value is positive on the inner side of the face.
+    one of its corners. The returned volume is positive if the corner is on the inner side of the face.
     """
     return -_triple(tet, FACES[face, 0], FACES[face, 1], FACES[face, 2], other, k)
 
@@ -224,8 +224,8 @@ def _in_front(out, n, tet, height, wedge, order):  # type: ignore[no-untyped-def
 
 @njit("float64(float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1])", cache=True)
 def intersection(pieces, others, one, other):  # type: ignore[no-untyped-def]
-    """Six times the common volume, m^3, of two tets (4, 3). Neither tet is inverted. The first tet is cut by the face
-    planes of the second tet, one after the other. ``pieces``, ``others`` (_PIECES, 4, 3): working arrays.
+    """Six times the common volume, m^3, of two tets (4, 3). Neither of the two tets is inverted. The first tet is cut
+    by the face planes of the second tet, one after the other. ``pieces``, ``others`` (_PIECES, 4, 3): working arrays.
     """
     n, height, wedge, order = 1, np.empty(4), np.empty((6, 3)), np.empty(4, np.int64)
     pieces[0] = one

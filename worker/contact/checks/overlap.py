@@ -17,16 +17,16 @@ from ..narrow_phase.facing import FACING
 _INSIDE = 1e-9
 """Tolerance of the volume coordinates, for the test whether a node is inside of a tet."""
 _ROUNDING = 1e-6
-"""Ratio of the depth of a node to the size of a face. Depths below this ratio count as 0."""
+"""Ratio of the depth of a node to the size of a face, below which the depth counts as 0."""
 _TRIES = 30
 """Largest number of passes in which overlapping bodies are moved apart. Chosen value."""
 
 
 _THROUGH = 0.1
-"""Tolerance for the crossing of an edge and a face. An edge passes through a face under two conditions. First, its two
-ends are on opposite sides of the face, and further from the plane of the face than this ratio times the size of the
-face. Second, the crossing point is further from each side of the face than this ratio times the altitude on that side.
-Rims, and facets of two round bodies that fit, overlap by less. Chosen value."""
+"""Tolerance for the crossing of an edge and a face. An edge passes through a face under two conditions. First, the two
+ends of the edge are on opposite sides of the face, and further from the plane of the face than the tolerance times the
+size of the face. Second, the crossing point is further from each side of the face than the tolerance times the altitude
+of the face on that side. Rims, and facets of two round bodies that fit, overlap by less. Chosen value."""
 _CRUSHED = 0.1
 """Smallest allowed ratio of the volume of a tet after the move to its volume before the move. Chosen value."""
 
@@ -192,7 +192,7 @@ def _faced(outward: Floats, inward: Floats) -> Flags:
     given by their normals into the tets (p, 4, 3).
 
     If sides of two bodies lie in one plane and one body penetrates the other, a rim node of the first body is on that
-    side of the second body. In this case the side does not support the node.
+    side of the second body. The side does not support such a rim node.
     """
     return np.asarray((inward * outward[:, None]).sum(axis=2) >= -FACING)
 
@@ -207,8 +207,8 @@ def _inward(corners: Floats) -> Floats:
 def _clear(normals: Floats, ways: Floats) -> Flags:
     """(f,) True for each plane if a node lies on it, because no tet of the node reaches behind the plane. The planes go
     through the node and have the unit ``normals`` (f, 3); ``ways`` (w, 3): vectors from the node to the corners of its
-    tets. The test holds for any mean normal of the node; it is needed because a corner at the rim of two slanted sides
-    may face neither side.
+    tets. The test of the planes is valid for any mean normal of the node. The test is needed because a corner at the
+    rim of two slanted sides may face neither side.
     """
     return np.asarray((normals @ ways.T).min(axis=1) >= -_ROUNDING * np.linalg.norm(ways, axis=1).max())
 

@@ -1,3 +1,3 @@
-"""Narrow phase: selects the active contacts from the candidate pairs in every step. The contacts are of nodes on faces,
-edges on edges, and nodes across cracks.
+"""Narrow phase: selects the active contacts from the candidate pairs in every step. There are contacts of nodes on
+faces, of edges on edges, and of nodes across cracks.
 """

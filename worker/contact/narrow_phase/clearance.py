@@ -1,10 +1,12 @@
-"""Clearance of a scene: a bound of the motion up to which no candidate pair has to be tested.
+"""Clearance of a scene: a bound of the motion of its slots. While the motion is smaller, no candidate pair has to be
+tested.
 
 Every candidate pair has a bound (broad_phase/pairs.py). The pair is not tested while the sum of the distances of its
 members from their short lines and of the relative motion of these lines is below the bound. After a step without active
-contacts the clearance is the smallest bound of all pairs, less the relative motion up to a time ``until``. Up to this
-time no pair is tested while twice the largest distance of a slot from its short line is below the clearance. The narrow
-phase is then only a comparison of two numbers. The answer does not depend on the clearance.
+contacts the clearance is computed: the smallest value over all pairs of the bound minus the relative motion up to a
+time ``until``. Up to the time ``until`` no pair is tested while twice the largest distance of a slot from its short
+line is below the clearance. The narrow phase is then only a comparison of two numbers. The answer does not depend on
+the clearance.
 """
 
 import math
@@ -19,7 +21,7 @@ from ..scene.scene import Scene
 from ..surface import normals
 
 _STEPS = float(normals.EVERY)
-"""Time for which a clearance is computed, in steps. New short lines begin after normals.EVERY steps."""
+"""Number of steps for which a clearance is computed. New short lines begin after normals.EVERY steps."""
 _ROUNDING = 1e-9
 """Fraction of the size of a face that is subtracted for round-off."""
 _NONE: Ints = np.zeros(0, np.int64)
@@ -48,14 +50,12 @@ class Clearance:
                 _none_tested(table)
 
     def holds(self, now: Scene) -> bool:
-        """Whether the clearance is valid for the scene ``now`` and for the present step."""
+        """True if the clearance is valid for the scene ``now`` and for the present step."""
         reference = now.reference
         return now is self._scene and self._width > 0.0 and reference.end + reference.beyond <= self._until
 
     def exceeds(self, reference: ReferenceMotion) -> bool:
-        """Whether the clearance is large enough: no slot is so far from its short line in the step that a pair must be
-        tested.
-        """
+        """True if the clearance is so large that no pair must be tested in the step."""
         return bool(2.0 * reference.short.left.max(initial=0.0) < self._width)
 
 
@@ -65,8 +65,8 @@ def _none_tested(table: PairTable) -> None:
 
 @njit("float64(float64[::1], float64[::1], float64)", cache=True)
 def _least(until, speed, end):  # type: ignore[no-untyped-def]
-    """Smallest value of bound minus relative motion over all pairs, m; -1 if a pair must be tested before the time
-    ``end``. ``until`` (p,): bounds of the pairs; the relative motion is that of the lines of a pair up to ``end``.
+    """Smallest value over all pairs of bound minus relative motion, m; -1 if a pair must be tested before the time
+    ``end``. ``until`` (p,): bounds of the pairs. The relative motion is that of the lines of a pair up to ``end``.
     """
     least = np.inf
     for p in range(len(until)):

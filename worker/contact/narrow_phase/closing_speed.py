@@ -1,5 +1,5 @@
-"""Closing speed of active contacts; it bounds the next time step, because no node may pass more than a fixed fraction
-of a tet in one step.
+"""Closing speed of active contacts. The closing speed limits the next time step, because no node may pass more than a
+fixed fraction of a tet in one step.
 """
 
 import numpy as np
@@ -12,8 +12,8 @@ _F = types.float64
 
 @njit("void(float64[:, ::1], int64, float64[:, ::1], int64, int64)", cache=True)
 def bound(box, row, v, first, stop):  # type: ignore[no-untyped-def]
-    """Sets a ``row`` of ``box`` to the lowest of the velocities ``v`` (n, 3) from ``first`` to ``stop``, and to minus
-    the highest of these velocities.
+    """Sets the ``row`` of ``box`` to six numbers: the lowest components of the velocities ``v`` (n, 3) from ``first``
+    to ``stop``, and minus the highest components.
     """
     for i in range(6):
         box[row, i] = np.inf
@@ -24,8 +24,8 @@ def bound(box, row, v, first, stop):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[:, ::1], int64)", cache=True)
 def spread(boxes, many):  # type: ignore[no-untyped-def]
-    """Upper bound of the difference of any two velocities in the first ``many`` of ``boxes`` (k, 6), m/s; it is the
-    diagonal of the box that contains these boxes (``bound``).
+    """Upper bound of the difference of any two velocities, m/s: the diagonal of the box that contains the first
+    ``many`` of ``boxes`` (k, 6) (``bound``).
     """
     square = 0.0
     for i in range(3 if many > 0 else 0):
@@ -50,9 +50,9 @@ def fastest_of(step, corners, s, f):  # type: ignore[no-untyped-def]
 
 @njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64, _F), cache=True, error_model="numpy")
 def closing_rate(step, corners, s, f, fastest):  # type: ignore[no-untyped-def]
-    """Square of a rate, 1/s^2, of node s and face f: the largest velocity change by contact, divided by the least
-    altitude of their tets; the result is 0 if they do not approach by more than ``step.fast`` in a step. ``fastest``:
-    result of ``fastest_of``.
+    """Square of a rate, 1/s^2, of node s and face f. The rate is the largest velocity change by contact, divided by the
+    smallest altitude of their tets. The result is 0 if the node and the face do not approach each other by more than
+    ``step.fast`` in a step. ``fastest``: result of ``fastest_of``.
     """
     if not fastest * step.beyond**2 > step.fast**2:
         return 0.0
@@ -68,8 +68,8 @@ def closing_rate(step, corners, s, f, fastest):  # type: ignore[no-untyped-def]
 )
 def approach(out, found, pairs, faces, step, first, stop):  # type: ignore[no-untyped-def]
     """Largest square of a rate, 1/s^2, of the active contacts ``found`` from ``first`` to ``stop``, which are rows of
-    ``out``. The rate is the relative speed of a node divided by the altitude of the tet of its face; ``closing_rate``
-    is included.
+    ``out``. The rate is the relative speed of a node divided by the altitude of the tet of its face. The value
+    ``closing_rate`` is also included in the maximum.
     """
     e, f, r = np.empty(3), np.empty(3), np.empty(3)
     x, most = step.x, 0.0

@@ -1,14 +1,15 @@
 """Contact of separated nodes with the faces at their former corner.
 
 When the star of a node separates into three or more pieces, two copies of the node are twins across a facet only if
-their pieces have this facet in common. With all other pieces a copy has only an edge or the node in common. At the
+their pieces have this facet in common. With any other piece a copy has only an edge or the node in common. At the
 moment of separation the copy lies on all sides of these pieces (faces of broken facets that are not surface yet), with
 a gap of zero. The position of the copy at the end of the step determines which side the copy would enter: the nearest
 side that is above the copy and contains its foot (docs/theory/fracture.md, "Contact").
 
-Such sides are called narrow sides. The corners of narrow sides are processed family by family; a family is all copies
-of one original node. The positions of each member relative to all corners of its family are computed in loops over rows
-of a few kilobytes, which the compiler vectorizes; the few corners that pass this test are then tested one by one.
+Sides that a copy of a node touches only at an edge or at the node are called narrow sides. The corners of narrow sides
+are processed family by family; a family is all copies of one original node. The positions of each member relative to
+all corners of its family are computed in loops over rows of a few kilobytes, which the compiler vectorizes; the few
+corners that pass this test are then tested one by one.
 """
 
 from typing import NamedTuple
@@ -43,7 +44,7 @@ from .tables import CONTACT_ROWS, DEEP_SELF, STEP, needed
 _SOON, _NEXT = 16, 8
 """Prefetch distances, in corners: for the node numbers of a side, and for the positions of these nodes."""
 _LATER = np.array([0, 1, 2, 0, 1])
-"""Corners of a side in cyclic order."""
+"""Corners of a side, in cyclic order."""
 _I, _F, _F1, _F2 = types.int64, types.float64, types.float64[::1], types.float64[:, ::1]
 _N1, _N2, _N3 = types.int32[::1], types.int32[:, ::1], types.int32[:, :, ::1]
 
@@ -70,8 +71,8 @@ NARROW = record(NarrowSides, _N2, _N3, types.uint32[:, ::1], _N2, types.uint8[:,
 
 @njit("int64(uint32[:, ::1], int32[:, ::1], uint8[:, ::1], int64, int64, int64)", cache=True, forceinline=True)
 def _opened(tets, across, bond, e, f, g):  # type: ignore[no-untyped-def]
-    """Bits that show which sides of tet ``e`` are broken or exposed: 1 for the side opposite to node ``f``, 2 for the
-    side opposite to node ``g``.
+    """Returns two bits that show which sides of tet ``e`` are broken or exposed: 1 for the side opposite to node ``f``,
+    2 for the side opposite to node ``g``.
     """
     first, second = 0, 0
     for k in range(4):
@@ -94,8 +95,8 @@ def _bring(corners, i, cracks, place, ahead):  # type: ignore[no-untyped-def]
 
 @njit(f"UniTuple(float64, 2)({VECTOR}, {VECTOR}, {VECTOR})", cache=True, forceinline=True)
 def _foot(r, e, f):  # type: ignore[no-untyped-def]
-    """Area coordinates of the foot of a point at the ends of e and f, times the square of twice the area. ``r``: vector
-    from the common origin of e and f to the point.
+    """Area coordinates of the foot of a point at the ends of e and f, multiplied by the square of twice the area of the
+    side. ``r``: vector from the common origin of e and f to the point.
     """
     ee, ff, ef, er, fr = dot(e, e), dot(f, f), dot(e, f), dot(e, r), dot(f, r)
     return ff * er - ef * fr, ee * fr - ef * er
@@ -136,9 +137,9 @@ def _beside(r, inward, e, f, g, opened):  # type: ignore[no-untyped-def]
 )
 def _pushed_out(out, step, first, stop):  # type: ignore[no-untyped-def]
     """Completes the contacts of entering nodes in place. The contacts are rows of ``out`` from ``first`` to ``stop``. A
-    row has the slots of the node, of the corner and of the other two nodes of the side, clockwise seen from outside,
-    and the weights of the last three at the foot. Contacts that are deeper than DEEP_SELF at the beginning of the step
-    are removed. Returns the number of remaining contacts.
+    row contains four slots: the node, the corner, and the other two nodes of the side, clockwise seen from outside. The
+    row also contains the weights of the last three slots at the foot of the node. Contacts that are deeper than
+    DEEP_SELF at the beginning of the step are removed. Returns the number of remaining contacts.
     """
     x, v, ahead, n = step.x, step.v, step.ahead, first
     for r in range(first, stop):
@@ -170,8 +171,8 @@ def _pushed_out(out, step, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _N2, _N1, _I, _I, _N2, _N1, _N1, types.float64[:, :]), cache=True, forceinline=True)
 def _gather(w, rest, corners, head, many, cracks, among, place, ahead):  # type: ignore[no-untyped-def]
-    """Writes data of ``many`` corners from ``head`` on: their positions and those of the other nodes of their sides to
-    the rows ``w``, and the three local nodes of each corner to ``rest``.
+    """Writes data of ``many`` corners, from corner ``head`` on. The positions of the corners and of the other nodes of
+    their sides are written to the rows ``w``, and the three local nodes of each corner to ``rest``.
     """
     for i in range(many):
         _bring(corners, head + i, cracks, place, ahead)

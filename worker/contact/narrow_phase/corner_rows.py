@@ -5,15 +5,16 @@ from ..geometry import VECTOR, cross, dot
 from ..surface.sharp import SHARP
 
 _BENT = 1.0 - SHARP * SHARP
-"""Square of the sine of the largest angle between two neighbouring faces of a smooth surface. The angle is equal to the
-limit for sharp edges."""
+"""Square of the sine of the largest angle between two neighbouring faces of a smooth surface, which is the limit for
+sharp edges (surface/sharp.py)."""
 MANY = 64
-"""Number of corners in one block of rows. A block has 10 kB, which fit into the first-level cache."""
+"""Number of corners in one block of rows. A block has 10 kB and fits into the first-level cache."""
 WORD = 8
-"""Number of flags in a word; it is the number of float64 in the longest vector register."""
+"""Number of flags in a word, which is the number of float64 in the longest vector register."""
 CORNER, TO_F, TO_G, INWARD = (MANY * row for row in (0, 3, 6, 9))
-"""First rows of three vectors with three components, and of the position of the corner: the vectors from the corner to
-the other two nodes of the side, clockwise seen from outside; the inward normal of the side."""
+"""First rows of three vectors and of one position, with three components each. The vectors are those from the corner to
+the other two nodes of the side, clockwise seen from outside, and the inward normal of the side. The position is that of
+the corner."""
 SQUARE, FF, GG, FG, TWIN = (MANY * row for row in (12, 13, 14, 15, 16))
 """Rows of numbers: the square of the normal, the dot products of the two edges, and the index of the corner's twin
 among the members of the family."""
@@ -54,8 +55,8 @@ def measure(w, n):  # type: ignore[no-untyped-def]
 
 @njit(types.void(types.uint8[::1], _F1, _I, _I, _F, _F, _F), cache=True, error_model="numpy")
 def under(flags, w, n, member, x, y, z):  # type: ignore[no-untyped-def]
-    """Sets the flags of those among the first ``n`` corners whose side is above the ``member`` at x, y, z and contains
-    its foot.
+    """Sets a flag for each of the first ``n`` corners whose side is above the ``member`` at x, y, z and contains its
+    foot.
 
     A foot beyond an edge still counts if a neighbouring face could contain it, at an angle below that of a sharp edge.
     A foot on the far side of the corner does not count.

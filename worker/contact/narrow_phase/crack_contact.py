@@ -8,20 +8,20 @@ from ..geometry import at, cross, dot, half, minus, plus
 from .tables import CONTACT_ROWS, CRACK, DEEP_SELF, NEAR, STEP, needed
 
 _WIDE = 0.2
-"""Smallest ratio of the width of a crack to the typical size of a face at which the sides of the crack are surface.
-With 0.1, 33 of the 38 searches in the first 500 steps of the glass bar are caused by cracks that open without having
-been included in a search; with 0.2, 2 of 32 searches."""
+"""Ratio of the width of a crack to the typical size of a face, from which on the sides of the crack are surface. With
+0.1, 33 of the 38 searches in the first 500 steps of the glass bar are caused by cracks that open without having been
+included in a search; with 0.2, 2 of 32 searches."""
 _FORESEEN = 0.5
-"""Fraction of the width _WIDE from which on the faces of a crack are in the broad phase, so that their candidate pairs
+"""Fraction of the width _WIDE. The faces of a crack that is wider are in the broad phase, so that their candidate pairs
 exist when the crack opens."""
 _AHEAD = 8
-"""Distance, in cracks, by which the data of nodes are prefetched."""
+"""Distance, in cracks, by which kernels prefetch the data of nodes."""
 
 
 @njit("int64[::1](int32[:, ::1], float64[:, ::1], float64)", cache=True)
 def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
-    """Returns the rows of those ``cracks`` (m, 6) that are so wide at the positions ``x`` (slots, 3) that their faces
-    must be in the broad phase. The cracks are given by slots; ``typical``: size of a face, m.
+    """Returns the rows of those ``cracks`` (m, 6) whose faces must be in the broad phase, because the cracks are wide
+    at the positions ``x`` (slots, 3). The nodes of the cracks are given by slots; ``typical``: size of a face, m.
     """
     rows, n = np.empty(len(cracks), np.int64), 0
     for c in range(len(cracks)):
@@ -62,11 +62,11 @@ def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def across(out, base, opening, cracks, typical, step, first, stop):  # type: ignore[no-untyped-def]
-    """Writes contacts of nodes across the ``cracks`` (m, 6; -1 for cracks of other ranks) from ``first`` to ``stop``:
-    contacts are rows of ``out`` from ``base + 3 first`` on.
+    """Writes contacts of nodes across the ``cracks`` (m, 6; -1 for cracks of other ranks) from ``first`` to ``stop``.
+    The contacts are written to the rows of ``out`` from ``base + 3 first`` on.
 
     ``typical``: size of a face, m. Returns the number of contacts, and the number of cracks that have become wide
-    enough to open; writes the numbers of these cracks to ``opening`` (m,), from ``first`` on.
+    enough to open. Writes the numbers of the cracks that open to ``opening`` (m,), from ``first`` on.
     """
     x, v, part, mu, dt = step.x, step.v, step.part, step.mu, step.dt
     n, wide = base + 3 * first, first

@@ -22,14 +22,14 @@ from ..surface.families import CornerLists, Corners, Families, TouchingRows
 from ..surface.records import CrackSides
 
 AGE, _YOUNG = 16, 0.3
-"""Number of steps between two checks of the ages of cracks; and fraction of young cracks above which all cracks become
-aged (docs/theory/contact.md, "Edges at cracks")."""
+"""Two constants: number of steps between two checks of the ages of cracks; and a fraction of young cracks, above which
+all cracks become aged (docs/theory/contact.md, "Edges at cracks")."""
 _KEPT = 12
 """Number of columns of the stored impulses of a crack."""
 _COLUMNS = "faces", "nodes", "sides", "foreseen", "aged", "places", "kept"
 """Names of the arrays with one row for each crack."""
 _IN_LIST, _WALKED = 1, 2
-"""Marks of a node: the node is in the list; its family is in the list."""
+"""Two marks of a node: the node is in the list; the family of the node is in the list."""
 
 
 @dataclass
@@ -44,20 +44,21 @@ class Cracks:
     sides: Indices
     """(m, 2, 3) block, tet and face of each side; -1 for a side of another rank."""
     foreseen: Flags
-    """(m,) whether the scene of the last search includes the sides."""
+    """(m,) True for each crack whose sides were included in the last search."""
     aged: Flags
-    """(m,) whether each crack is aged. Edges between the sides of an aged crack and the surface are in edge-edge
+    """(m,) True for each aged crack. The edges between the sides of an aged crack and the surface are in edge-edge
     contact."""
     places: Indices
     """(m, 6) slots of the nodes. All slots are -1 for a crack without separated nodes, and for a crack that another
-    rank computes. The rank of the first side computes a crack."""
+    rank computes. A crack is computed by the rank of its first side."""
     kept: Floats
-    """(m, 12) stored impulse times row norm, m/s, of each of the three pairs of nodes across: along the normal (1) and
-    across it (3). Zero for a pair that was not active; undefined for a crack that another rank computes."""
+    """(m, 12) stored impulse of each of the three pairs of opposite nodes, multiplied by the row norm, m/s: along the
+    normal (1 value) and across it (3 values). The stored impulse is zero for a pair that was not active, and undefined
+    for a crack that another rank computes."""
     families: Families
     """Families of all local nodes. A family is all copies of one original node."""
     _corners: dict[int, Corners] = field(default_factory=dict)
-    """Corners of the narrow sides, keyed by block; they are kept until cracks or families change."""
+    """Corners of the narrow sides; the keys are blocks. The corners are kept until cracks or families change."""
     _rooms: Rooms = field(default_factory=lambda: Rooms(*_COLUMNS), init=False, repr=False)
 
     @classmethod
@@ -120,7 +121,7 @@ class Cracks:
         return cls(faces, nodes.places(table["with"]), sides, foreseen, aged, nowhere, kept, families)
 
     def foresee(self) -> CrackSides:
-        """Marks all local sides as foreseen and returns them, for a scene that includes them."""
+        """Marks all local sides as included in a search, and returns these sides for the new scene."""
         self.foreseen[:] = True
         sides, aged = self.sides.reshape(-1, 3), np.repeat(self.aged, 2)
         here = sides[:, 1] >= 0
@@ -128,7 +129,9 @@ class Cracks:
 
     @property
     def ages(self) -> Ints:
-        """(2,) number of young cracks, and number of all cracks. A crack is counted by the rank of its first side."""
+        """(2,) number of young cracks, and number of all cracks. The rank of the first side of a crack counts the
+        crack.
+        """
         mine = self.sides[:, 0, 1] >= 0
         return np.array([int((mine & ~self.aged).sum()), int(mine.sum())])
 
@@ -143,7 +146,7 @@ class Cracks:
 
     def beside(self, rows: Ints, blocks: list[Block]) -> Indices:
         """Returns the nodes of the local tets at the cracks ``rows``, and the nodes of the families at the corners of
-        these tets, each node once. The nodes of the cracks that this rank computes are included.
+        these tets. Each node is returned once. The nodes of the cracks that this rank computes are included.
         """
         marks, ring = self.families.marks, self.families.ring
         found = np.empty(len(ring), np.int32)
@@ -154,8 +157,8 @@ class Cracks:
         return found[:n]
 
     def arrange(self) -> None:
-        """Sorts the cracks by the slots of their first nodes, so that neighbours in space become neighbours in
-        memory.
+        """Sorts the cracks by the slots of their first nodes, so that cracks that are neighbours in space are
+        neighbours in memory.
         """
         order = np.argsort(self.places[:, 0], kind="stable")
         for column in self._columns().values():
@@ -167,13 +170,15 @@ class Cracks:
         return np.flatnonzero(among(tets, self.faces // 4).any(axis=1) & (self.sides[:, 0, 1] >= 0))
 
     def drop(self, block: int, places: Indices) -> None:
-        """Follows a removal of tets without cracks from a block; ``places``: new places of its tets."""
+        """Updates the table after a removal of tets without cracks from a block; ``places``: new places of the tets of
+        the block.
+        """
         here = (self.sides[:, :, 0] == block) & (self.sides[:, :, 1] >= 0)
         self.sides[here, 1] = places[self.sides[here, 1]]
 
     def forget(self, removed: Flags, ids: Ints) -> None:
-        """Takes ``removed`` nodes (nodes,) out of their families: they are corners of no contact; ``ids`` of the local
-        nodes.
+        """Removes the ``removed`` nodes (nodes,) from their families; these nodes are corners of no contact. ``ids``:
+        global ids of the local nodes.
         """
         families = self.families
         some = np.flatnonzero(removed & (families.ring != np.arange(len(removed))))
@@ -183,7 +188,7 @@ class Cracks:
 
     def open(self, faces: Ints, blocks: list[Block]) -> None:
         """Removes cracks from the table because their sides are now surface; ``faces``: first sides of these cracks,
-        ascending. The last rows of the table are moved to the free rows.
+        ascending. The last rows of the table of cracks are moved to the rows that become free.
         """
         rows = named(self.faces[:, 0], faces)
         sides = self.sides[rows].reshape(-1, 3)
@@ -237,8 +242,8 @@ def _families_beside(found, marks, rows, nodes, ring):  # type: ignore[no-untype
     cache=True,
 )
 def _tets_beside(found, n, marks, rows, nodes, sides, block, tets):  # type: ignore[no-untyped-def]
-    """Adds nodes to a list of ``n`` nodes and returns the new number of nodes; the added nodes are those of the local
-    tets of one block at the cracks ``rows`` with separated nodes.
+    """Adds nodes to a list of ``n`` nodes. The added nodes are those of the local tets of one block at the cracks
+    ``rows`` with separated nodes. Returns the new number of nodes.
     """
     for r in rows:
         if nodes[r, 0] == nodes[r, 3] and nodes[r, 1] == nodes[r, 4] and nodes[r, 2] == nodes[r, 5]:
@@ -256,7 +261,7 @@ def _tets_beside(found, n, marks, rows, nodes, sides, block, tets):  # type: ign
 
 @njit("int64[::1](int64[:], int64[::1])", cache=True)
 def named(ids, wanted):  # type: ignore[no-untyped-def]
-    """Returns the indices of those elements of ``ids`` that are among ``wanted``, which is ascending."""
+    """Returns the indices of those elements of ``ids`` that are also in ``wanted``, which is ascending."""
     rows, n = np.empty(len(ids), np.int64), 0
     for i in range(len(ids)):
         at = np.searchsorted(wanted, ids[i])

@@ -31,34 +31,34 @@ from .tables import FAST, Step, StepRoom
 from .tied import Tied
 
 _KINEMATIC = 2.0
-"""Inverse of the largest fraction of the altitude of a tet that a node may pass in a step."""
+"""Inverse of the largest fraction of the altitude of a tet that a node may pass in one step."""
 _FACES, _EDGES, _CRACKS, _CORNERS = 0, 1, 2, 3
 """Numbers of the kinds of contacts (rows.py): node-face, edge-edge, across cracks, at corners. Each block has a
 separate number for contacts at corners."""
 _JOIN = 0.6
-"""Fraction of the distance from its line at which a slot must be registered again. In a step in which a rank must
-register slots, all other ranks register their slots beyond this fraction; with this rule ranks register in the same
-steps and wait for each other less often. The answer does not depend on this fraction."""
+"""Fraction of the distance from its line at which a slot must be registered again. If at least one rank must register
+slots in a step, all other ranks register their slots that have departed by more than the fraction ``_JOIN``. Therefore
+ranks register in the same steps and wait for each other less often. The answer does not depend on ``_JOIN``."""
 
 _NONE: Ints = np.zeros(0, np.int64)
 
 
 @dataclass
 class Detected:
-    """Results of a detection. The active contacts are rows of the scene."""
+    """Results of a detection. The active contacts are in the scene, as rows."""
 
     approach: float
-    """Inverse of the largest step, 1/s, in which no node passes more than half of a tet with which it is in contact, or
-    will be in contact in the next step."""
+    """Inverse of the largest time step, 1/s, in which no node passes more than half of a tet with which it is in
+    contact, or will be in contact in the next step."""
     opening: Ints
-    """Rows of the cracks that are wide enough to open."""
+    """Rows of the cracks that are wide enough to open, that is, to become part of the surface."""
     stray: bool
     """True if a slot will depart so far from its line in the next step that it must be registered again. After the
-    reduction of the step the value is that of any rank."""
+    reduction of the step the value is True if it was True on any rank."""
 
     @classmethod
     def nothing(cls) -> "Detected":
-        """Returns the results that are valid before the first step."""
+        """Returns the results before the first step."""
         return cls(0.0, np.zeros(0, np.int64), False)
 
 
@@ -82,7 +82,7 @@ class Detection:
     """Finds the active contacts of a rank, on the threads of its ``team``."""
 
     def __init__(self, team: Team, registered: Registration, *, lasting: bool = False) -> None:
-        """``lasting``: whether the surface of the bodies is constant during the run."""
+        """``lasting``: True if the surface of the bodies is constant during the run."""
         self._registered, self._lasting, self.clearance = registered, lasting, Clearance()
         self.tied: Tied | None = None
         """Tied bonds of the slots of the scene."""
@@ -97,10 +97,10 @@ class Detection:
         """(blocks,) number of families in each block."""
         self._scratch, self._sizes, self._sums = StepRoom(), tuple[int, ...](), list[np.ndarray]()
         self._rows_of_corner = 1
-        """Number of rows that are reserved for each corner of a narrow side, on average over a task."""
+        """Number of rows that are reserved for each corner of a narrow side, as a mean over a task."""
 
     def _stages(self) -> list[Span]:
-        """Returns the stages of a step. The order is that of their numbers."""
+        """Returns the stages of a step, in the order of their numbers."""
         slots, pairs, some, sides = SLOTS_OF_A_TASK, PAIRS_OF_A_TASK, CONTACTS_OF_A_TASK, SIDES_OF_A_TASK
         every = [
             (stages.take, layout.OWN_N, slots), (stages.ahead, layout.SLOTS_N, slots), (stages.spread, layout.ONE, 1),
@@ -138,7 +138,7 @@ class Detection:
         """Detects the active contacts of the step from positions and velocities of the scene's nodes.
 
         ``surface``: surface of this rank; ``mu`` (parts, parts): coefficient of friction, NaN if two parts cannot be in
-        contact; ``redraw``: whether new short lines begin in this step (reference_motion.py); ``together``: whether any
+        contact; ``redraw``: True if new short lines begin in this step (reference_motion.py); ``together``: True if any
         rank registers departed slots in this step.
         """
         reference = now.reference
@@ -161,8 +161,9 @@ class Detection:
         return self.found
 
     def retarget(self, now: Scene, share: float, give: float) -> None:
-        """Sets the target velocities of active contacts. ``share``: see restitution.rebound; ``give``: if 0, contact
-        has no energy to return, and ``hold_back`` is applied (tables.PUSH_OUT).
+        """Sets the target velocities of active contacts. ``share``: see restitution.rebound; ``give``: fraction of a
+        penetration that is corrected (tables.PUSH_OUT). If ``give`` is 0, contact has no energy to return, and
+        ``hold_back`` is applied.
         """
         counts = self._counts
         counts[layout.RETARGETS] = (share > 0.0) + 2 * (give == 0.0)
@@ -240,8 +241,8 @@ class Detection:
         return opening
 
     def _rooms(self, on: int, off: int, m: int) -> list[np.ndarray]:
-        """Working arrays for ``on`` node-face pairs, ``off`` edge-edge pairs and ``m`` cracks; see CRACKS and SUMS in
-        layout.py.
+        """Returns working arrays for ``on`` node-face pairs, ``off`` edge-edge pairs and ``m`` cracks; see CRACKS and
+        SUMS in layout.py.
         """
         faces, edges, cracks = -(-on // PAIRS_OF_A_TASK), -(-off // PAIRS_OF_A_TASK), -(-m // CRACKS_OF_A_TASK)
         some, real = self._scratch.of, np.float64
@@ -280,8 +281,8 @@ class Detection:
     def _at_block(
         self, now: Scene, k: int, block: Block, corners: Corners, cracks: Cracks, step: Step
     ) -> tuple[Ints, Ints, Ints]:  # fmt: skip
-        """Sets the arguments of the stage of block number ``k``. Returns three arrays over the tasks: number of
-        contacts, which the stage sets, first corner, and number of corners.
+        """Sets the arguments of the stage of block number ``k``. Returns three arrays with one value for each task:
+        number of contacts, which the stage sets; first corner; and number of corners.
         """
         n = len(corners.start) - 1
         begins = corners.start[:n:FAMILIES_OF_A_TASK].astype(np.int64)

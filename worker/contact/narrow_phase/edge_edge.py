@@ -13,8 +13,8 @@ from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, bon
 
 _PARALLEL = 1e-3
 """Sine of the smallest angle between two edges in edge-edge contact. At smaller angles only nodes and faces are in
-contact, and two nearly parallel ridges could penetrate by this fraction of the length of an edge; at this angle the
-crossing point is accurate to 1e-10 of the length of an edge."""
+contact, and two nearly parallel ridges could penetrate by the sine of the angle times the length of an edge. At the
+smallest angle the crossing point is accurate to 1e-10 of the length of an edge."""
 _END = 1e-4
 """Fraction of the length of an edge, at each end, in which the edge has no edge-edge contact, because the node at the
 end is in contact with faces. Chosen value: a tenth of MARGIN, the distance by which the foot of a node may lie outside
@@ -22,20 +22,22 @@ of a face. Therefore, when an edge slides over a rim, edge-edge contact ends onl
 begun."""
 _FLUSH = 0.05
 """Sine of the largest angle by which the normal of a contact may lie outside of the sector between the normals of the
-two faces. If two faces lie on each other, their edges cross with normals slightly outside of this sector. Chosen value,
-by tests of fragments that are pressed together (docs/theory/contact.md, "Face on face")."""
+two faces. If two faces lie on each other, their edges cross with normals slightly outside of the sector between the
+normals of the two faces. Chosen value, by tests of fragments that are pressed together (docs/theory/contact.md, "Face
+on face")."""
 _ROUND = 0.01
-"""Tolerance for round-off, as a fraction of the length of an edge; it is added to the distance of contact."""
+"""Tolerance for round-off, as a fraction of the length of an edge. The tolerance is added to the distance of
+contact."""
 _WORTH = 0.02
-"""Smallest slack, as a fraction of the length of an edge, for which a pair is deactivated. A pair with less slack is
+"""Smallest slack with which a pair is deactivated, as a fraction of the length of an edge. A pair with less slack is
 tested in every step, which takes less time than the computation of its slack."""
 _STRETCH = 0.1
-"""Largest relative motion of the ends of two edges, divided by the lengths of the edges, for which the bounds of
-``beyond_ends`` are valid."""
+"""Largest relative motion of the ends of two edges, divided by the lengths of the edges. The bounds of ``beyond_ends``
+are valid up to the largest relative motion."""
 _SPARE = 0.006
-"""Smallest slack, as a fraction of the length of an edge, for which a pair is deactivated because the edges cross
-beyond an end (compare _WORTH). Chosen value: in shattering glass the ends of edges depart from their short lines by a
-fifth of this value."""
+"""Smallest slack with which a pair is deactivated because the edges cross beyond an end, as a fraction of the length of
+an edge (compare _WORTH). Chosen value: in shattering glass the ends of edges depart from their short lines by a fifth
+of the smallest slack."""
 _SOON, _NEXT = 16, 8
 """Prefetch distances, in pairs of edges: for the node numbers of the ends of edges, and for the positions of the
 ends."""
@@ -46,9 +48,8 @@ _I, _F, _N1 = types.int64, types.float64, types.int32[::1]
 
 @njit(f"{_SECTOR}({VECTOR}, {_X2}, {_V2}, {_N2}, int64, float64)", cache=True, error_model="numpy")
 def _sector(u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
-    """Four numbers of edge e after a time ``h``; the first is the sense of rotation from the normal of its first face
-    to that of its second face; 0 for an edge that is not convex. The others are the cross products of u with the two
-    normals, along u.
+    """Returns three values of edge e after a time ``h``: the sense of rotation from the normal of its first face to
+    that of its second face (0 for an edge that is not convex), and the cross products of u with the two normals.
     """
     a, c, d = edges[e, 0], edges[e, 2], edges[e, 3]
     to, fro = minus(at(x, c), at(x, a)), minus(at(x, d), at(x, a))
@@ -103,8 +104,8 @@ def _fastest(course, a, b, c, d):  # type: ignore[no-untyped-def]
 @njit(f"float64({VECTOR}, {VECTOR}, {VECTOR}, float64, float64)", cache=True, error_model="numpy")
 def beyond_ends(u, w, r, s, t):  # type: ignore[no-untyped-def]
     """Returns a bound of the motion of the ends of edge u relative to the ends of edge w, m; up to this motion the
-    edges cross beyond an end of u or w. The result is 0 if they cross within both edges; now they cross at ``s`` of u
-    and ``t`` of w; ``r``: vector from the beginning of u to the beginning of w.
+    edges cross beyond an end of u or w. The result is 0 if the lines of the edges cross within both edges. At present
+    the lines cross at ``s`` of u and ``t`` of w; ``r``: vector from the beginning of u to the beginning of w.
 
     Derivation: the edges cross beyond an end of edge a, at a fraction S of its length from this end; let k be the
     vector from this end to an end of the other edge b, and n = a x b. Then (k x b) . n = -S n . n, and the edges cross
@@ -185,8 +186,8 @@ def _opposite(edges, one, two):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def _due(rows, until, speed, left, fresh, active, end, many):  # type: ignore[no-untyped-def]
-    """Selects the pairs to be tested among the first ``many`` of the pairs ``rows``, and writes them to ``active``.
-    Returns their number.
+    """Selects the pairs to be tested among the first ``many`` of the pairs ``rows``. Writes them to ``active``, and
+    returns their number.
     """
     n = 0
     for p in range(many):
@@ -202,8 +203,8 @@ def _due(rows, until, speed, left, fresh, active, end, many):  # type: ignore[no
     forceinline=True,
 )
 def _crossing(x, ahead, a, b, c, d):  # type: ignore[no-untyped-def]
-    """Fraction tau of the step after which the lines ab and cd cross, 1 if they do not cross in the step. Then the
-    vectors u, w and r at this time.
+    """Returns the fraction tau of the step after which the lines ab and cd cross; 1 if they do not cross in the step.
+    Also returns the vectors u, w and r at this time.
     """
     u0, w0, r0 = minus(at(x, b), at(x, a)), minus(at(x, d), at(x, c)), minus(at(x, c), at(x, a))
     u, w = minus(at(ahead, b), at(ahead, a)), minus(at(ahead, d), at(ahead, c))

@@ -1,4 +1,4 @@
-"""Tests that determine on which side of a body a node is. The tests use the orientation of nodes to faces; they also
+"""Tests that determine on which side of a body a node is. The tests use the orientation of nodes to faces, and also
 treat nodes beside a convex edge, and nodes in front of another face at the edge (docs/theory/contact.md, "Which point"
 and "Beside a free edge").
 """
@@ -10,35 +10,36 @@ from ..geometry import MARGIN, VECTOR, at, dot, foot, height, minus, off
 from .tables import DEEP, DEEP_SELF, FACES, NEAR, PAIRS, STEP
 
 TOUCHING = 1e-3
-"""Ratio of the depth to the size of a face. A node that is deeper inside of a part than this ratio has contact only
-with the nearest face of that part."""
+"""Ratio of the depth of a node to the size of a face. If a node is inside of a part by more than this ratio, it has
+contact only with the nearest face of that part."""
 FACING = 0.1
 """A node faces a face when the cosines between the normal of the face and the normals of the node's own faces have a
 mean minus deviation below -FACING, and either a mean below FACING, or the node's own faces rise from the face by a mean
-slope whose sine exceeds FACING. With this definition, the lowest corner of a single tet faces the plane below it for
-any mean of its three normals."""
+slope whose sine exceeds FACING. With this definition of facing, the lowest corner of a single tet faces the plane below
+it for any mean of its three normals."""
 _SOME = 0.25
 """A node of another part that passes a face from outside has contact with the face when the mean minus deviation of
 the cosines is below -_SOME, because then at least one face of the node faces the face. If no cosine is negative,
 mean minus deviation is at least (1 - sqrt(2)) / 2 = -0.207."""
 RIM = 0.01
-"""Fraction of the size of a face; a node is beside a convex edge if it faces both faces of the edge, slides along one
-of them, and is not deeper below that face than this fraction. Chosen value: twice the penetration of a sharp edge that
-slides along another edge, 1e-3 to 4e-3, at the moment when the end of the edge reaches the other edge. A node can be
-deeper than this below a face at a rim because edges have no contact at their ends."""
+"""Largest depth, as a fraction of the size of a face, at which a node is beside a convex edge. The node faces both
+faces of the edge, slides along one of them, and is not deeper below that face than this. Chosen value: twice the
+penetration of a sharp edge that slides along another edge, 1e-3 to 4e-3, at the moment when the end of the edge reaches
+the other edge. A node can be deeper than this fraction below a face at a rim because edges have no contact at their
+ends."""
 _SLIDES = 2e-3
-"""Fraction of the size of a face. A node that slides along a face approaches it by less than this fraction in a step. A
-node that approaches faster counts as beside the edge only up to the depth TOUCHING; otherwise the contact of a fast
-projectile would be detected one step late (test_hard_contact). Chosen value: twice the fastest approach observed in
-sliding."""
+"""Fraction of the size of a face. A node that slides along a face approaches the face by less than this fraction of its
+size in a step. A node that approaches faster counts as beside the edge only up to the depth TOUCHING; otherwise the
+contact of a fast projectile would be detected one step late (test_hard_contact). Chosen value: twice the fastest
+approach observed in sliding."""
 _BEHIND = 0.1
-"""Fraction of the size of a face, which is compared with the sum of the depths of the corners of the face behind a
-neighbouring face; if the sum is above this value, the common edge is convex. The chosen value is below the sum for an
-angle of 25 degrees between the faces, and above round-off."""
+"""Limit, as a fraction of the size of a face, for the sum of the depths of the corners of a face behind a neighbouring
+face. If the sum is above this limit, the common edge is convex. Chosen value: below the sum for an angle of 25 degrees
+between the faces, and above round-off."""
 _OVER = 0.1
-"""Smallest component along a face of the mean direction from a node to the midpoints of its own faces; above this value
-the faces of the node reach over that face. The faces of a blunt edge have a component below this value; chosen value: a
-third of the component for the corner of a cube."""
+"""Limit for the component, along a face, of the mean direction from a node to the midpoints of its own faces. If the
+component is above this limit, the faces of the node reach over that face. The faces of a blunt edge have a smaller
+component. Chosen value: a third of the component for the corner of a cube."""
 _F, _VECTOR = types.float64, types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
 
 
@@ -68,8 +69,9 @@ def reaches_over(normals, s, b, e, f, size):  # type: ignore[no-untyped-def]
     """Returns True if the faces of node s, by their mean direction, reach over another face on whose border the foot of
     the node is. ``b``: area coordinates of the foot on the face with the edges ``e`` and ``f``.
 
-    In that case the body of the node moves onto the face, not past the face. Example: if two bodies collide with equal
-    faces, all nodes have their feet on the border of a face, and no node is ever inside of the other body.
+    If the faces of the node reach over the other face, the body of the node moves onto the face, not past the face.
+    Example: if two bodies collide with equal faces, all nodes have their feet on the border of a face, and no node is
+    ever inside of the other body.
     """
     way = normals[s, 9], normals[s, 10], normals[s, 11]
     ee, ff, ef, er, fr = dot(e, e), dot(f, f), dot(e, f), dot(e, way), dot(f, way)
@@ -114,8 +116,8 @@ def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: igno
     determines on which side of the surface a node is. Only faces at a distance below a fraction of their size are
     tested: all candidate lists include faces up to this distance. A face whose pair is deactivated is further away and
     is not tested. ``strayed``: distance of the node from its line, infinite if the pairs have no valid bounds. ``end``:
-    time of the end of the step, plus one further step, because another thread may have just measured a pair at the end
-    of the step.
+    time of the end of the step plus one further step. The further step is needed because another thread may have just
+    measured a pair at the end of the step.
     """
     rows, corners, size = pairs.rows, faces.corners, faces.size
     s, body = rows[p, 0], part[corners[rows[p, 1], 0]]

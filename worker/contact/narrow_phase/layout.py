@@ -31,11 +31,11 @@ own_of = table_of(OWN, *_KINDS[OWN])
 """Fields of the table OWN: slots and local indices of the nodes of this rank; positions and velocities of all nodes of
 this rank."""
 places_of = table_of(PLACES, *_KINDS[PLACES])
-"""Fields of the table PLACES, for the slots: x, v, positions at the beginning and at the end of the step, v(n-1/2);
-bounds of v for each task."""
+"""Fields of the table PLACES, for the slots: positions x and velocities v; positions at the beginning and at the end of
+the step; velocities v(n-1/2); and bounds of v for each task."""
 lines_of = table_of(LINES, *_KINDS[LINES])
 """Fields of the table LINES: distances, positions and velocities of the search lines; the same three of the short
-lines; slots that are measured; largest distance from the search lines for each task."""
+lines; flags of the slots whose motion is measured; and largest distance from the search lines for each task."""
 sides_of = table_of(SIDES, *_KINDS[SIDES])
 """Fields of the table SIDES: distances and corners of faces; distances and corners of edges."""
 numbers_of = table_of(NUMBERS, *_KINDS[NUMBERS])
@@ -51,17 +51,17 @@ edge_pairs_of = table_of(EDGE_PAIRS, *_KINDS[EDGE_PAIRS])
 cracks_of = table_of(CRACKS, *_KINDS[CRACKS])
 """Fields of the table CRACKS: slots of the cracks, and cracks that open."""
 sums_of = table_of(SUMS, *_KINDS[SUMS])
-"""Fields of the table SUMS, with one value for each task: node-face pairs to be tested; their contacts; squares of
-rates of pairs that come near, and of contacts; tested edge-edge pairs; their contacts; contacts across cracks; cracks
-that open."""
+"""Fields of the table SUMS, with one value for each task: number of node-face pairs to be tested; number of their
+contacts; squares of the rates of pairs that come near, and of contacts; number of tested edge-edge pairs; number of
+their contacts; number of contacts across cracks; number of cracks that open."""
 
 (
     OWN_N, SLOTS_N, FACES_N, EDGES_N, CRACKS_N, FACE_PAIRS_N, EDGE_PAIRS_N, FIRST, ON_FACES, FOUND, RETARGETED, ONE,
     WIDE, RETARGETS, FACE_ROWS, EDGE_ROWS, CRACK_ROWS, COUNTS,
 ) = range(18)  # fmt: skip
 """Indices of the integers: numbers of nodes of this rank, slots, faces, edges, cracks, pairs; contacts at corners,
-contacts with faces, all contacts, contacts whose target changes; the number 1; cracks that open; whether targets
-change: 1 by restitution, 2 without energy to give back, 3 both; first rows of the kinds of contacts."""
+contacts with faces, all contacts, contacts whose target changes; the number 1; cracks that open; reason for a change of
+targets: 1 restitution, 2 no energy to give back, 3 both; first rows of the kinds of contacts."""
 DT, MOST, FAST_SIZE, T, END, BEYOND, STRAYED, LIMIT, SIZE, SHARE, REALS = range(11)
 """Indices of the floating point numbers: length of the step, and largest length of the next step, s; distance above
 which closing pairs limit a step, m; beginning and end of the step, s after the search; time after the end of the step,

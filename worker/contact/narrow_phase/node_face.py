@@ -14,13 +14,13 @@ from .facing import facing, plane
 from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, bonded
 
 _ROUND = 0.01
-"""Tolerance for round-off, as a fraction of the size of a face; it is added to the distance of contact."""
+"""Tolerance for round-off, as a fraction of the size of a face. The tolerance is added to the distance of contact."""
 _WORTH = 0.02
-"""Smallest slack, as a fraction of the size of a face, for which a pair is deactivated. A pair with less slack is
+"""Smallest slack with which a pair is deactivated, as a fraction of the size of a face. A pair with less slack is
 tested in every step, which takes less time than the computation of its slack."""
 _BEND = 0.1
-"""Largest relative motion of two corners of a face, divided by the lengths of its two edges, for which the bound of
-``_bent`` is valid."""
+"""Largest relative motion of two corners of a face, divided by the lengths of its two edges. The bound of ``_bent`` is
+valid up to the largest relative motion."""
 
 _SOON, _NEXT = 8, 4
 """Prefetch distances, in pairs: for a node and a face, and for the corners of a face."""
@@ -51,8 +51,8 @@ def _distance(x, s, i, j, k):  # type: ignore[no-untyped-def]
 
 @njit(f"float64(float64, {_X2}, int64, int64, int64)", cache=True, error_model="numpy")
 def _bent(turn, x, i, j, k):  # type: ignore[no-untyped-def]
-    """Half of a motion D, m. If no two corners of a face move by D relative to each other, the normal of the face turns
-    by less than ``turn``.
+    """Returns half of a motion D, m. The normal of the face turns by less than ``turn`` while no two corners of the
+    face move by D relative to each other.
 
     The normal of a face with edges e, f and area A changes by less than D (|e| + |f| + D) / A while no two of its
     corners have moved by D relative to each other.
@@ -126,9 +126,9 @@ def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
     ``first`` on. Returns the number of selected pairs. ``end``: end of the time for which contact is tested, s after
     the search.
 
-    The bound of a selected pair is set to "too close to be deactivated" during the test, so that a thread that reads
-    the bound (facing.py) while another thread tests the pair treats the pair as near. A pair whose face is not exposed
-    or whose node is not on the surface is deactivated until this changes.
+    During the test the bound of a selected pair has the value for "too close to be deactivated", because another thread
+    may read the bound (facing.py) during the test, and must treat the pair as near. A pair whose face is not exposed or
+    whose node is not on the surface is deactivated until the face is exposed and the node is on the surface.
     """
     rows, until, speed, turned = pairs.rows[first:], pairs.until[first:], pairs.speed[first:], pairs.turned[first:]
     active, exposed, on_surface = pairs.active[first:], faces.exposed, slots.on_surface

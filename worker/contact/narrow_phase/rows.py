@@ -1,5 +1,5 @@
-"""Rows of the active contacts of a step. The module has the ranges in which passes write the rows, and the list of the
-active rows.
+"""Rows of the active contacts of a step. The module manages the ranges in which passes write the rows, and the list of
+the active rows.
 """
 
 from dataclasses import dataclass, field
@@ -12,8 +12,9 @@ from ...model.state import Floats, Indices
 from .tables import ContactRows
 
 _SPARE = 4
-"""Number of needed rows for each spare row. Rows are reserved for all candidate pairs, which are twenty times as many
-as active contacts. More spare rows take memory; fewer spare rows require new allocations more often."""
+"""Number of needed rows for each spare row. Rows are reserved for all candidate pairs, and there are twenty times as
+many candidate pairs as active contacts. More spare rows take memory; fewer spare rows require new allocations more
+often."""
 
 
 @dataclass
@@ -34,7 +35,7 @@ class ActiveRows:
     _holder: Indices = field(default_factory=lambda: np.zeros(0, np.int32), init=False)
 
     def begin(self, *many: int) -> None:
-        """Begins a step without contacts. Reserves ``many`` rows for each kind of contact."""
+        """Begins a step without contacts. Reserves rows for each kind of contact; ``many``: their numbers."""
         self._ends, self.n = [0, *accumulate(many)], 0
         self._reserve(self._ends[-1])
 
@@ -49,7 +50,7 @@ class ActiveRows:
 
     def holder(self, slots: int) -> Indices:
         """Returns a working array with at least ``slots`` elements, all -1. Each function that uses the array must
-        reset it to -1.
+        reset all elements to -1.
         """
         if len(self._holder) < slots:
             self._holder = np.full(slots + slots // _SPARE, -1, np.int32)
@@ -69,8 +70,8 @@ class ActiveRows:
 
 @njit("int64(int32[::1], int64, int64, int64, int64[::1], int64)", cache=True)
 def collected(found, n, base, size, counts, tasks):  # type: ignore[no-untyped-def]
-    """Writes the row numbers of ``tasks`` into ``found`` from ``n`` on. Task k has ``counts[k]`` rows, from ``base``
-    plus k times ``size`` on. Returns the new length of ``found``.
+    """Writes the numbers of the rows that ``tasks`` have written into ``found`` from ``n`` on. Task k has ``counts[k]``
+    rows, from ``base`` plus k times ``size`` on. Returns the new length of ``found``.
     """
     for k in range(tasks):
         for row in range(base + k * size, base + k * size + counts[k]):
@@ -81,8 +82,8 @@ def collected(found, n, base, size, counts, tasks):  # type: ignore[no-untyped-d
 
 @njit("int64(int32[::1], int64, int64[::1], int64[::1])", cache=True)
 def gathered(found, n, begins, counts):  # type: ignore[no-untyped-def]
-    """Writes the row numbers of tasks into ``found`` from ``n`` on. Task k has ``counts[k]`` rows, from ``begins[k]``
-    on. Returns the new length of ``found``.
+    """Writes the numbers of the rows that tasks have written into ``found`` from ``n`` on. Task k has ``counts[k]``
+    rows, from ``begins[k]`` on. Returns the new length of ``found``.
     """
     for k in range(len(counts)):
         for row in range(begins[k], begins[k] + counts[k]):

@@ -1,4 +1,5 @@
-"""Selection among the possible contacts of a node with faces, the last part of the node-face contact of a step.
+"""Selection among the possible contacts of a node with faces. The selection is the last part of the detection of
+node-face contacts in a step.
 
 A node over an edge or a corner of a flat patch of faces has its foot on all faces there, and a possible contact with
 each of these faces. If two flush surfaces have equal meshes, a node has five possible contacts on average. Contacts
@@ -13,13 +14,14 @@ from .facing import RIM, TOUCHING, in_front, outside, reaches_over
 from .tables import CONTACT_ROWS, FACES, PAIRS, SLOTS, STEP, needed
 
 _FLAT = 1.0 - 1e-4
-"""Smallest cosine of the angle between the normals of two faces of a flat patch; the angle is 0.8 degrees. Chosen
-value: flat faces approximate the normals of a curved surface with a larger error."""
+"""Smallest cosine of the angle between the normals of two faces of a flat patch. The largest angle is 0.8 degrees.
+Chosen value: flat faces approximate the normals of a curved surface with a larger error."""
 _ROUNDING = 1e-6
-"""Difference of area coordinates below which two feet have the same margin to the rims of their faces. Chosen value:
-far above rounding errors, so that mirror images choose the images of the same faces, and far below geometry.MARGIN."""
+"""Difference of area coordinates. If the margins of two feet to the rims of their faces differ by less, the margins
+count as equal. Chosen value: far above rounding errors, so that mirror images choose the images of the same faces, and
+far below geometry.MARGIN."""
 _NO_CONTACT = -1.0
-"""Depth of a row without contact."""
+"""Value in the column of depths that marks a row without contact."""
 _I, _F, _N1, _F1 = types.int64, types.float64, types.int32[::1], types.float64[::1]
 
 
@@ -35,7 +37,7 @@ def link(earlier, last, found, nodes):  # type: ignore[no-untyped-def]
 
 @njit("boolean(int32[:, ::1], float64[:, ::1], int64, int64)", cache=True, forceinline=True)
 def _covers(nodes, weights, r, t):  # type: ignore[no-untyped-def]
-    """Returns whether row ``t`` has the weights of row ``r`` at all nodes where they count."""
+    """Returns True if row ``t`` has the weights of row ``r`` at all nodes where they count."""
     for a in range(1, 4):
         other = 0.0
         for b in range(1, 4):
@@ -48,16 +50,16 @@ def _covers(nodes, weights, r, t):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[:, ::1], int64)", cache=True, forceinline=True)
 def _margin(weights, row):  # type: ignore[no-untyped-def]
-    """Returns the smallest area coordinate of the foot of contact ``row``, in units of _ROUNDING, as a whole number. It
-    is negative outside of the face.
+    """Returns the smallest area coordinate of the foot of contact ``row``, in units of _ROUNDING, as a whole number;
+    negative if the foot is outside of the face.
     """
     return np.rint(min(-weights[row, 1], -weights[row, 2], -weights[row, 3]) / _ROUNDING)
 
 
 @njit(types.boolean(CONTACT_ROWS, PAIRS, FACES, _N1, _N1, _N1, _I), cache=True)
 def _repeated(out, pairs, faces, found, earlier, last, row):  # type: ignore[no-untyped-def]
-    """Returns whether the node of ``row`` has an equal contact with a better face: a face that contains the foot with a
-    larger margin or, if the margins are equal, a face of lower id. Equal contacts have weights that differ by at most
+    """Returns True if the node of ``row`` has an equal contact with a better face. A face is better if it contains the
+    foot with a larger margin or, for equal margins, has a lower id. Equal contacts have weights that differ by at most
     RIM, and normals within _FLAT.
     """
     nodes, weights, m = out.nodes, out.weights, out.normals
@@ -117,8 +119,8 @@ def admitted(out, depth, pairs, slots, faces, step, found, earlier, last, end, f
 @njit(_I(_N1, CONTACT_ROWS, _F1, PAIRS, FACES, _N1, _N1, _N1), cache=True)
 def nearest(found, out, depth, pairs, faces, part, earlier, last):  # type: ignore[no-untyped-def]
     """Removes rows without contact from ``found``. A node that is behind several faces of a part keeps only its contact
-    with the nearest face; of two faces at the same depth, with the face of lower id. Returns the number of remaining
-    contacts. ``earlier`` (n,) and ``last`` (slots,): lists of ``link``; ``last`` is -1 on return.
+    with the nearest face; if two faces are at the same depth, with the face of lower id. Returns the number of
+    remaining contacts. ``earlier`` (n,) and ``last`` (slots,): lists of ``link``; ``last`` is -1 on return.
     """
     for row in found:
         last[out.nodes[row, 0]] = -1

@@ -1,8 +1,8 @@
-"""Stages of the narrow phase: kernels over slots, faces, edges, cracks, pairs and contacts; their tables are in
+"""Stages of the narrow phase: kernels over slots, faces, edges, cracks, pairs and contacts. Their tables are in
 layout.py.
 
-Each task writes its rows from its own offset on, and writes the number of its rows to its element of the sums. Kernels
-without a range are run by one thread.
+Each task writes its rows from its own offset on, and writes the number of its rows to its element of the sums. One
+thread runs each kernel that has no range.
 """
 
 from ...kernels.jit import njit, types
@@ -52,15 +52,15 @@ from .rows import collected
 from .tables import CONTACT_ROWS, STEP
 
 PAIRS_OF_A_TASK = 1024
-"""Number of candidate pairs in a task; chosen value: a task takes about 20 us, compared with 2 us to start a parallel
+"""Number of candidate pairs in a task. Chosen value: a task takes about 20 us, compared with 2 us to start a parallel
 region."""
 CRACKS_OF_A_TASK, FAMILIES_OF_A_TASK, CONTACTS_OF_A_TASK, SLOTS_OF_A_TASK, SIDES_OF_A_TASK = 512, 128, 1024, 2048, 8192
 """Numbers of cracks, of families, of contacts, of slots, and of faces or edges in a task. Chosen values: a task takes
 about 20 us, compared with 2 us to start a parallel region."""
 TAKE, AHEAD, SPREAD, LEAVE, LARGEST_FACES, LARGEST_EDGES, CHECK, ACROSS, DUE, NODE_FACE, LINK, ADMIT = range(12)
 NEAREST, APPROACH, EDGE_EDGE, COLLECT, RETARGET, CORNERS_FROM = range(12, 18)
-"""Numbers of the stages, in the order of execution; the last number is that of the first of the stages over corners;
-each block has one such stage."""
+"""Numbers of the stages, in the order of execution. The last of these stages is the first stage over corners; each
+block has one such stage."""
 AT_CORNERS = CONTACT_ROWS, types.int64, types.int64, NARROW, CORNERS, STEP, types.int64[::1]
 _at_corners = reader(*AT_CORNERS)
 
@@ -81,7 +81,7 @@ def take(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def ahead(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``tables.place`` and ``closing_speed.bound``."""
+    """Task: runs ``tables.place`` and ``closing_speed.bound`` for a range of slots."""
     x, v, places, _, boxes = places_of(table)
     tables.place(places, x, v, numbers_of(table)[1][DT], first, stop)
     closing_speed.bound(boxes, first // SLOTS_OF_A_TASK, v, first, stop)
@@ -89,9 +89,9 @@ def ahead(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def spread(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Sets the length of time, after the end of the step, in which closing pairs are detected. If two slots may
-    approach by FAST_SIZE in the longest next step, as their velocities differ, it is the length of this step, else 0.
-    Slower pairs cannot limit a step, so ranks that have only slow nodes need no data of other ranks.
+    """Sets the length of time, after the end of the step, in which closing pairs are detected. If the velocities show
+    that two slots may approach by FAST_SIZE in the longest possible next step, it is the length of this step, else 0.
+    Slower pairs cannot limit a step. Therefore ranks that have only slow nodes need no data of other ranks.
     """
     (counts, reals, _), boxes = numbers_of(table), places_of(table)[4]
     fastest = closing_speed.spread(boxes, tasks_of(counts[SLOTS_N], SLOTS_OF_A_TASK))
@@ -135,7 +135,7 @@ def check(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def across(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``crack_contact.across``."""
+    """Task: runs ``crack_contact.across`` for a range of cracks."""
     (counts, reals, _), (cracks, opening), k = numbers_of(table), cracks_of(table), first // CRACKS_OF_A_TASK
     _, _, _, _, _, _, found, wide = sums_of(table)
     found[k], wide[k] = crack_contact.across(
@@ -145,7 +145,7 @@ def across(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def due(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``node_face.due``."""
+    """Task: runs ``node_face.due`` for a range of pairs."""
     (pairs, slots, faces), (_, reals, _) = face_pairs_of(table), numbers_of(table)
     many = sums_of(table)[0]
     end = reals[END] + reals[BEYOND]
@@ -178,7 +178,7 @@ def link(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def admit(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``single_contact.admitted``."""
+    """Task: runs ``single_contact.admitted`` for a range of contacts."""
     (out, found, depth, earlier, last), (pairs, slots, faces) = rows_of(table), face_pairs_of(table)
     (step,), (counts, reals, _) = now_of(table), numbers_of(table)
     single_contact.admitted(
@@ -197,7 +197,7 @@ def nearest(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def approach(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``closing_speed.approach``."""
+    """Task: runs ``closing_speed.approach`` for a range of contacts."""
     (out, found, _, _, _), (pairs, _, faces) = rows_of(table), face_pairs_of(table)
     most, begin = sums_of(table)[3], numbers_of(table)[0][FIRST]
     most[first // CONTACTS_OF_A_TASK] = closing_speed.approach(
@@ -207,7 +207,7 @@ def approach(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def on_edges(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``edge_edge.edge_edge``."""
+    """Task: runs ``edge_edge.edge_edge`` for a range of pairs."""
     (out, _, _, _, _), (pairs, edges, course), (step,) = rows_of(table), edge_pairs_of(table), now_of(table)
     (counts, reals, _), (_, _, _, _, tested, found, _, _) = numbers_of(table), sums_of(table)
     k = first // PAIRS_OF_A_TASK
@@ -236,7 +236,7 @@ def collect(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def retarget(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``restitution.rebound`` and ``restitution.hold_back``."""
+    """Task: runs ``restitution.rebound`` and ``restitution.hold_back`` for a range of contacts."""
     (out, found, _, _, _), (_, v, _, before, _) = rows_of(table), places_of(table)
     counts, reals, _ = numbers_of(table)
     if counts[RETARGETS] & 1:
@@ -247,6 +247,6 @@ def retarget(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def at_corners(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``corner_contact.entering``."""
+    """Task: runs ``corner_contact.entering`` for a range of families."""
     out, base, each, narrow, of, step, counts = _at_corners(table)
     counts[first // FAMILIES_OF_A_TASK] = corner_contact.entering(out, base, each, narrow, of, step, first, stop)

@@ -1,9 +1,10 @@
 """Records of the narrow phase: its input and its output. The output has one row for each active contact: four nodes,
 their weights and a normal.
 
-The gap is the gap at the end of a step without contact, positive outside. The gap is linear in the velocities: gap = dt
-n . sum(w_k v_k) plus a constant, with the weights w of ``weights``: 1 for the node and minus the area coordinates of
-the point of the face (the defence node, Zhong 1993), or the weights of the ends of two edges.
+The gap of a contact is the gap at the end of a step without contact, positive outside. The gap is linear in the
+velocities v_k of the four nodes: gap = dt n . sum(w_k v_k) plus a constant, with the normal n and the weights w of
+``weights``: 1 for the node and minus the area coordinates of the point of the face (the defence node, Zhong 1993), or
+the weights of the ends of two edges.
 """
 
 from typing import NamedTuple
@@ -18,7 +19,7 @@ from ..geometry import at, cross, dot, minus
 from .tied import NOTHING
 
 NEAR = 0.02
-"""Largest gap at the end of the step at which a contact is active, as a fraction of the size of a face."""
+"""Largest gap at the end of the step with which a contact is active, as a fraction of the size of a face."""
 DEEP = 0.25
 """Largest depth of a penetration, as a fraction of the size of a face, or of the length of an edge and the height of
 its tets. A node or edge that is deeper counts as being on the other side of a thin body."""
@@ -27,17 +28,17 @@ DEEP_SELF = 0.05
 all nodes of a part lie behind its own faces. For edges this fraction is also the smallest value of the largest depth of
 a contact, for tets of any height."""
 FAST = 0.1
-"""Fraction of the typical size of a face. A pair whose distance decreases by less in a step limits the time step only
-if it is active. The altitude of a tet of the typical size is several times this distance."""
+"""Fraction of the typical size of a face. A pair whose distance decreases by a smaller fraction in a step limits the
+time step only if it is active. The altitude of a tet of the typical size is several times this fraction of the size."""
 PUSH_OUT = 0.1
 """Largest fraction of a penetration that is corrected in a step, and largest fraction of the closing speed that is
-returned for the correction; the two fractions are 0 while contact has no energy to return (``account.Account``)."""
+returned for the correction. The fractions are 0 while contact has no energy to return (``account.Account``)."""
 CRACK = -2
-"""Number of the first pair of nodes across a crack. The numbers of further pairs of nodes across cracks decrease from
-this negative number."""
+"""Number of the first pair of nodes across a crack; this number is negative, and the numbers of further such pairs
+decrease from it."""
 _FEWEST = 2
 """Smallest number of rows of a table of cache lines. A table with a single row would be contiguous, which is a
-different type in numba."""
+different type for numba."""
 
 
 _NONE = np.empty(0)
@@ -68,8 +69,8 @@ class ContactRows(NamedTuple):
 
 
 class StepRoom(Scratch):
-    """Working arrays of a step; they are reused for many steps, because the operating system must clear new pages of
-    memory. Tables of arguments stay valid while the number of slots does not change.
+    """Working arrays of a step. The arrays are kept from step to step, because the operating system must clear new
+    pages of memory. Tables of arguments remain valid while the number of slots does not change.
     """
 
     def __init__(self) -> None:
@@ -107,24 +108,23 @@ class Step(NamedTuple):
     part: Indices
     """(slots,) part of each slot."""
     mu: Floats
-    """(parts, parts) Coulomb's coefficient; NaN if two parts cannot be in contact."""
+    """(parts, parts) Coulomb's coefficient of friction; NaN if two parts cannot be in contact."""
     give: float
     """Fraction of a penetration that is corrected in the step (PUSH_OUT)."""
     dt: float
     """Length of the step, s."""
     beyond: float
-    """Largest length of the next step, s, for which closing pairs are detected; 0 if no pair is fast enough."""
+    """Largest length of the next step for which closing pairs are detected, s; 0 if no pair is fast enough."""
     fast: float
-    """Distance, m; pairs whose distance decreases by less than this in the next step are ignored."""
+    """Smallest decrease of the distance of a pair in the next step, m; pairs with a smaller decrease are ignored."""
     rebound: float
     """Largest ratio of the velocity change by contact to the closing speed: 1 + restitution."""
     least: Floats
-    """(slots,) square of the least altitude of a node in the tets of its exposed faces, m^2; (0,) if ``beyond`` is
-    0.
-    """
+    """(slots,) square of the smallest altitude of a node in the tets of its exposed faces, m^2; (0,) if ``beyond`` is
+    0."""
     tied: Ints
-    """(slots,) bonds of each slot, as bits. Nodes with a common bond are not in contact. The array is (0,) if there are
-    no bonds (tied.py)."""
+    """(slots,) bonds of each slot, one bit for each bond. Nodes with a common bond are not in contact. The array is
+    (0,) if there are no bonds (tied.py)."""
 
     @classmethod
     def of(cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float) -> "Step":
@@ -162,7 +162,7 @@ class Pairs(NamedTuple):
     speed: Floats
     """(p,) relative speed of the reference motions of each pair, m/s; NaN if it is unknown."""
     turned: Flags
-    """(p,) whether each pair is deactivated because its node does not face the face, by the mean normals of the
+    """(p,) True for each pair that is deactivated because its node does not face the face, by the mean normals of the
     node."""
     next: Indices
     """(p,) next node-face pair of the same node, -1 for none; (0,) for pairs of edges."""
@@ -177,15 +177,15 @@ class SlotTable(NamedTuple):
     """(slots, 12) means over the faces of each node: of their normal n, of n n (xx, yy, zz, yz, zx, xy), and of the
     unit vector to the midpoint of the opposite edge; zero for a node without faces."""
     on_surface: Flags
-    """(slots,) whether each node is on the surface. Only nodes on the surface are in contact with faces."""
+    """(slots,) True for each node on the surface. Only nodes on the surface are in contact with faces."""
     first: Indices
-    """(slots,) first pair of each slot with a face, -1 for none."""
+    """(slots,) index of the first pair of each slot with a face; -1 if it has no such pair."""
     left: Floats
     """(slots,) distance of each slot from its reference motion, m."""
     course: Floats
     """(slots, 3) velocities of the reference motions, m/s."""
     fresh: Flags
-    """(slots,) whether the mean normals of each slot have changed."""
+    """(slots,) True for each slot whose mean normals have changed."""
 
 
 class FaceTable(NamedTuple):
@@ -197,11 +197,11 @@ class FaceTable(NamedTuple):
     """(f,) size of each face, m: the square root of twice its initial area."""
     id: Ints
     exposed: Flags
-    """(f,) whether each face is exposed; only exposed faces have contacts."""
+    """(f,) True for each exposed face; only exposed faces have contacts."""
     left: Floats
     """(f,) largest distance of a corner from its reference motion, m."""
     fresh: Flags
-    """(f,) whether each face has new corners or was exposed after the last step."""
+    """(f,) True for each face that has new corners or was exposed after the last step."""
 
 
 class EdgeTable(NamedTuple):
@@ -214,11 +214,11 @@ class EdgeTable(NamedTuple):
     deep: Floats
     """(e,) greatest depth of a contact of each edge, m; see records.Edges."""
     meets: Flags
-    """(e,) whether the states of the two faces of each edge admit edge-edge contact; see records.Edges."""
+    """(e,) True for each edge if the states of its two faces admit edge-edge contact; see records.Edges."""
     left: Floats
     """(e,) larger distance of the two ends of each edge from their reference motions, m."""
     fresh: Flags
-    """(e,) whether each edge has new corners, or a face that was exposed after the last step."""
+    """(e,) True for each edge that has new corners, or a face that was exposed after the last step."""
 
 
 _N1, _N2, _I1, _B1, _B2 = (
@@ -236,8 +236,8 @@ EDGES = record(EdgeTable, _N2, _F1, _F1, _B1, _F1, _B1)
 @njit("float64(float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
 def needed(gap0, gap1, speed, give, dt):  # type: ignore[no-untyped-def]
     """Returns the smallest change of the normal speed, m/s, with which the node does not pass the face. If the node is
-    already behind the face, the change prevents it from moving deeper. The change is (min(gap0, 0) - gap1) / dt, plus
-    the correction of a fraction ``give`` of the penetration (PUSH_OUT).
+    already behind the face, the change prevents it from moving deeper. The change is (min(gap0, 0) - gap1) / dt plus a
+    term that corrects the fraction ``give`` of the penetration (PUSH_OUT).
     """
     back = give * min(max(-gap0, 0.0) / dt, max(-speed, 0.0))
     return (min(gap0, 0.0) - gap1) / dt + back
@@ -252,7 +252,7 @@ def bonded(step, a, b, c, d):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64, int64, int64)", cache=True)
 def place(places, x, v, dt, first, stop):  # type: ignore[no-untyped-def]
-    """Writes the positions of the slots from ``first`` to ``stop``, now and after ``dt``, side by side."""
+    """Writes the positions of the slots from ``first`` to ``stop``, now and after the time ``dt``, side by side."""
     for a in range(first, stop):
         for i in range(3):
             places[a, i], places[a, 3 + i] = x[a, i], x[a, i] + dt * v[a, i]
@@ -268,7 +268,7 @@ def altitude(x, a, i, j, k):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[:, :], int32[:, ::1], boolean[::1])", cache=True)
 def least_altitudes(least, x, corners, exposed):  # type: ignore[no-untyped-def]
-    """Lowers Step.least to the altitudes at all exposed faces."""
+    """Lowers the array Step.least to the altitudes at all exposed faces."""
     for f in range(len(corners)):
         if exposed[f]:
             a, b, c, d = corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]

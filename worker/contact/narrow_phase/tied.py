@@ -8,7 +8,7 @@ from ...model.state import Ints
 from ..surface.records import SurfaceNodes
 
 NOTHING: Ints = np.zeros(0, np.int64)
-"""Value for a scene without bonds."""
+"""Value of the bonds for a scene without bonds."""
 
 
 class Ties(Protocol):
@@ -17,7 +17,7 @@ class Ties(Protocol):
     version: int
 
     def bits(self, ids: Ints) -> Ints:
-        """(k,) bonds of each node, as bits."""
+        """(k,) bonds of each node, one bit for each bond."""
 
 
 class Tied:
@@ -27,7 +27,7 @@ class Tied:
         self._bonds, self._ids, self._version, self._found = bonds, NOTHING, -1, NOTHING
 
     def bits(self, surface_nodes: SurfaceNodes) -> Ints:
-        """(slots,) bonds of each slot, as bits; see Ties.bits."""
+        """(slots,) bonds of each slot, one bit for each bond; see Ties.bits."""
         if self._ids is not surface_nodes.id or self._version != self._bonds.version:
             self._ids, self._version = surface_nodes.id, self._bonds.version
             self._found = self._bonds.bits(surface_nodes.id)

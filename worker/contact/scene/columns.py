@@ -63,8 +63,8 @@ class SceneSlots:
     """Columns with one value for each slot."""
 
     owned: Flags
-    """(slots,) True for each surface node that this rank owns. This rank computes the contacts of such nodes with
-    faces."""
+    """(slots,) True for each surface node that this rank owns. A rank computes the contacts of its own surface nodes
+    with faces."""
     pushes: Flags
     """(slots,) True for each node to which a contact of this rank may apply an impulse."""
     live: Flags
@@ -74,10 +74,10 @@ class SceneSlots:
     fresh: Flags
     """(slots,) True for each node whose pairs must be tested because its mean normals have changed."""
     tracked: Flags
-    """(slots,) True for each node whose motion is measured. These are nodes in the broad phase, and nodes of faces and
-    edges in the broad phase."""
+    """(slots,) True for each node whose motion is measured: nodes in the broad phase, and nodes of faces and edges in
+    the broad phase."""
     on_surface: Flags
-    """(slots,) True for each local node on the surface. Only these nodes are in contact with faces."""
+    """(slots,) True for each local node on the surface. Only local surface nodes are in contact with faces."""
     first: Indices
     """(slots,) index of the first pair of each slot with a face; -1 if the slot has no such pair."""
     root: Indices
@@ -116,8 +116,7 @@ class SceneFaces:
     exposed: Flags
     """(f,) True for each exposed face; only exposed faces have contacts."""
     live: Flags
-    """(f,) True for each face in the broad phase. These are the exposed faces, and the faces that may be exposed
-    soon."""
+    """(f,) True for each face in the broad phase: exposed faces, and faces that may be exposed soon."""
     new: Flags
     """(f,) True for each face whose candidate pairs must be searched again (registration)."""
     fresh: Flags
@@ -130,8 +129,8 @@ class SceneFaces:
 
     @cached_property
     def incidence(self) -> Incidence:
-        """Rows of the table at each slot of the last search. The first call must be made before any corner has been
-        replaced by a copy.
+        """Rows of the table at each slot of the last search. The first call of this method must be made before any
+        corner is replaced by a copy.
         """
         return Incidence(self.corners)
 
@@ -194,8 +193,8 @@ class SceneEdges:
 
     @cached_property
     def incidence(self) -> Incidence:
-        """Rows of the table at each slot of the last search. The first call must be made before any corner has been
-        replaced by a copy.
+        """Rows of the table at each slot of the last search. The first call of this method must be made before any
+        corner is replaced by a copy.
         """
         return Incidence(self.corners)
 

@@ -16,7 +16,7 @@ _CROWD_WORDS = 15
 """Number of words for one node in a message (``pack``)."""
 _ROOM = 32
 """Number of rows by which the message of a rank is enlarged, so that separated nodes rarely require a new message.
-Chosen value: this is 2 kB."""
+Chosen value: the additional rows take 2 kB."""
 
 
 def pack(faces: Faces, edges: Edges, surface_nodes: SurfaceNodes) -> Ints:

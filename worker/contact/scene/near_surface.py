@@ -16,7 +16,7 @@ from . import ghosts
 HALO = 1.0
 """Ratio of the width of the halo to the typical size of a face. Candidate pairs between slots of different ranks are
 complete only while each slot has departed from its reference motion by less than half of this width. Before a slot
-departs further than this, all ranks search again."""
+departs further from its reference motion, all ranks search again."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ Chosen values: a task takes 10 to 20 us, compared with 2 us to start a parallel 
 _AHEAD = 16
 """Distance, in nodes, by which kernels prefetch the data of nodes."""
 _SPARSE = 32
-"""Largest ratio of the largest id to the number of wanted ids for which a table of all ids is used. Above this ratio
+"""Largest ratio of the largest id to the number of wanted ids for which a table of all ids is used. For a larger ratio
 the ids are found by bisection, because the table takes longer to fill (model/ids.py)."""
 _I, _I1, _B1, _U2, _F2, _N1, _N2 = (
     types.int64, types.int64[::1], types.boolean[::1], types.uint8[:, ::1], types.float64[:, ::1], types.int32[::1],
@@ -94,7 +94,7 @@ def _flag(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _look_up(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: sets ``out`` to the rows of ids. It uses a table of all ids up to the largest id."""
+    """Task: sets ``out`` to the rows of ids, with a table of all ids up to the largest id."""
     out, ids, rows = _read_look_up(table)
     for k in range(first, stop):
         out[k] = rows[ids[k]] if ids[k] < len(rows) else -1

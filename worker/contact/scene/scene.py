@@ -100,7 +100,7 @@ class Scene:
             messages.copies.take(sends, receives)
 
     def store_before(self, nodes: Nodes) -> None:
-        """Stores the velocities v(n-1/2). This function must be called before the kick."""
+        """Stores the velocities v(n-1/2); to be called before the kick."""
         own = self.own
         self.passes.store.run(len(own.local), self.slots.before, nodes.v, own.slots, own.local)
         self.messages.copies.note(nodes)
@@ -207,8 +207,8 @@ class Scene:
         return bool(self.faces.new.any() or self.slots.new.any() or self.edges.new.any())
 
     def sharpen(self, least: Floats) -> Flags:
-        """Returns (e,) flags: True for each edge that has become sharp, by the cosines ``least`` (parts,). The method
-        adds these edges to the broad phase.
+        """Returns (e,) flags: True for each edge that has become sharp. ``least`` (parts,): cosine of the smallest
+        angle of a sharp edge. The method adds the edges that have become sharp to the broad phase.
         """
         edges, surface_nodes = self.edges, self.surface_nodes
         turned = self.passes.turned(edges.sharp, edges.corners, edges.meets, surface_nodes.x, surface_nodes.part, least)

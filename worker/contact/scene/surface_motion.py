@@ -22,8 +22,8 @@ _HORIZONS = np.array([10.0, 20.0, 40.0, 80.0, 160.0, 300.0])
 _SWEPT = 8.0
 """Largest mean number of cells that a node may sweep in a horizon. Chosen value: two cells along each axis."""
 _SPENT = 0.4
-"""Fraction of the width of the halo. If a node departs further than this from its extrapolated position, all ranks must
-search."""
+"""Fraction of the width of the halo. If a node departs from its extrapolated position by more than this fraction of the
+width, all ranks must search."""
 
 
 class SurfaceMotion:
@@ -107,9 +107,9 @@ class SurfaceMotion:
     def foresight(self, dt: float) -> tuple[float, Floats]:
         """Returns the horizon of a search in steps of length ``dt``, and the mean velocity (3,), m/s. Collective.
 
-        The horizon is as long as possible. The limit is that the mean volume swept by a node is below ``_SWEPT`` cells
-        of the size of a face. The swept length is about the length of a face if all nodes move. It is much longer if
-        only few nodes are fast.
+        The horizon is as long as possible. The limit of the horizon is that the mean volume swept by a node is below
+        ``_SWEPT`` cells of the size of a face. The swept length is about the length of a face if all nodes move; the
+        swept length is much longer if only few nodes are fast.
         """
         surface_nodes, owned = self.sides.surface_nodes, self.sides.owned
         v = surface_nodes.course[surface_nodes.places(owned)]
@@ -145,7 +145,7 @@ def _strayed(x, v, x_then, v_then, flags, dt, ahead):  # type: ignore[no-untyped
 
 def typical(sizes: Floats, comm: Comm) -> float:
     """Harmonic mean of the sizes of all faces, m; 0 if there are no faces. In a graded mesh the small faces dominate
-    this mean.
+    the harmonic mean.
     """
     total, count = exact_sums(comm, np.column_stack([1.0 / sizes, np.ones(len(sizes))]))
     return float(count / total) if count > 0.0 else 0.0

@@ -1,5 +1,5 @@
-"""Topology changes near one rank by a node separation (split). They consist of the changes of the nodes of the rank,
-and the changes of ghosts, which other ranks send.
+"""Topology changes near one rank by a node separation (split): changes of the nodes of the rank, and changes of ghosts,
+which other ranks send.
 """
 
 from dataclasses import dataclass
@@ -32,8 +32,8 @@ class SplitOfGhosts:
 def exchange(split: Split, scene: Scene, here: SurfaceNodes, comm: Comm) -> SplitOfGhosts | None:
     """Sends the separations of nodes to the ranks that have the nodes as ghosts. Returns the separations of the ghosts
     of this rank; None if no ghost has separated. ``here``: all nodes of this rank, by local index. Separations of
-    ghosts are received from the rank that sends the state of the ghosts. Only ranks that send or receive such messages
-    take part.
+    ghosts are received from the rank that sends the state of the ghosts. Only ranks that send or receive messages about
+    separations take part.
     """
     sources = [other.rank for other in scene.messages.copies.receives if split.touched[other.rank]]
     if not (sources or split.touched[comm.rank]):

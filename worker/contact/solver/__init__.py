@@ -1,1 +1,3 @@
-"""Solver of contact: computes the impulses of the active contacts by projected Jacobi sweeps, and sums over ranks."""
+"""Solver of contact, which computes the impulses of the active contacts by projected Jacobi sweeps, and sums over
+ranks.
+"""

@@ -1,7 +1,7 @@
 """Records of the solver: active contacts, their nodes, and the contacts with an impulse.
 
 The nodes of active contacts are numbered without gaps; such a number is called a **slot**. All data of a node that a
-sweep needs are in one cache line, floats and integers side by side.
+sweep needs is in one cache line, floats and integers side by side.
 """
 
 from typing import NamedTuple
@@ -33,8 +33,8 @@ class ActiveContacts(NamedTuple):
     """(contacts, 4) slots of the nodes. The third slot is -1 in a contact of two nodes, which have the weights 1 and
     -1."""
     reach: Floats
-    """(contacts,) reach of each contact, m/s. An idle contact stays idle while the sum of the velocity changes of its
-    nodes is below its reach. The reach of a loaded contact is infinite."""
+    """(contacts,) reach of each contact, m/s. An idle contact has no impulse in the step so far; it remains idle while
+    the sum of the velocity changes of its nodes is below its reach. The reach of a loaded contact is infinite."""
     weights: Floats
     """(rows, 4) weights; see tables.ContactRows."""
     normals: Floats
@@ -48,8 +48,8 @@ class ActiveContacts(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """Stored impulses of the last step times their row norms, m/s, for the warm start: along the normal (1) and across
-    it (3). Zero for a pair that had no impulse.
+    """Stored impulses of the last step, multiplied by their row norms, m/s, for the warm start: along the normal (1
+    value) and across it (3 values). The stored impulses are zero for a pair that had no impulse.
     """
 
     pairs: Floats
@@ -70,7 +70,8 @@ class ActiveNodes(NamedTuple):
     """(slots, 8) mobilities, and impulses of the step."""
     fixed_words: Ints
     row_weights: Ints
-    """(slots, 4) sums of |w| |n_i| and of |w| over the contacts of all ranks, quanta."""
+    """(slots, 4) sums over the contacts of all ranks, quanta: of |w| |n_i|, with the weight w and the normal n of a
+    contact, and of |w|."""
     path: Floats
     """(slots,) sum of the l1 norms of the velocity changes of each slot in the step, m/s."""
 

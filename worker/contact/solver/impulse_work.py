@@ -1,5 +1,5 @@
-"""Work of the contact impulses of a step; it is computed for the normal impulses, for friction, and for the supports of
-held nodes.
+"""Work of the contact impulses of a step, computed for the normal impulses, for friction, and for the supports of held
+nodes.
 """
 
 import numpy as np
@@ -18,8 +18,8 @@ def cost(words, loaded, active, before, places, joule, k):  # type: ignore[no-un
     1 / ``joule`` J.
 
     An impulse J that changes the normal speed from u(n-1/2) to u(n+1/2) takes the energy -J (u(n-1/2) + u(n+1/2)) / 2.
-    The energy ledger at time n contains the first half of this energy. ``before`` (surface_nodes, 3): velocities
-    v(n-1/2); ``places``: rows of the slots.
+    The energy ledger at time n contains the first half of the energy of an impulse. ``before`` (surface_nodes, 3):
+    velocities v(n-1/2); ``places``: rows of the slots.
     """
     values, normal, tangent, slots = active.moving, loaded.normal, loaded.tangent, loaded.slots
     value = np.empty(2)
@@ -44,8 +44,8 @@ def cost(words, loaded, active, before, places, joule, k):  # type: ignore[no-un
 @njit(types.void(_I2, LOADED, NODES, _F2, _N1, _F, _I), cache=True)
 def heat(words, loaded, active, before, places, joule, k):  # type: ignore[no-untyped-def]
     """Adds two energies to ``words``: the work of friction of set ``k``, which is mean sliding velocity times impulse;
-    and the half of this work with v(n+1/2), which the energy ledger at time n does not contain. The rows of ``words``
-    are two limbs, in quanta of 1 / ``joule`` J.
+    and the half of this work that is computed with v(n+1/2), which the energy ledger at time n does not contain. The
+    rows of ``words`` are two limbs, in quanta of 1 / ``joule`` J.
     """
     values, normal, tangent, slots = active.moving, loaded.normal, loaded.tangent, loaded.slots
     value = np.empty(2)
@@ -92,7 +92,7 @@ def between(words, loaded, places, part, scale, k):  # type: ignore[no-untyped-d
 @njit(types.void(_F1, _F1, _N1, _N1, _F2, _I2, _F2, _F, _I, _I), cache=True)
 def book(loss, external, places, index, before, total, mobility, scale, first, stop):  # type: ignore[no-untyped-def]
     """Adds half of impulse times velocity, at the ``places`` from ``first`` to ``stop``, to the energy lost by contact.
-    Where a velocity is held, the work is added to the external work. ``index``: see slot_numbers.py.
+    If a velocity is held, the work is added to the external work. ``index``: see slot_numbers.py.
     """
     for s in range(first, stop):
         a = places[s]

@@ -1,7 +1,7 @@
 """Tables of the solver, under one handle for all stages of a step (parallel/arguments.py), and the numbers that the
 stages share.
 
-A table is set by the owner of its arrays; it changes only if one of its arrays is replaced.
+The owner of the arrays of a table sets the table. A table changes only if one of its arrays is replaced.
 """
 
 import numpy as np
@@ -34,7 +34,8 @@ _KINDS = {
 rows_of = table_of(ROWS, *_KINDS[ROWS])
 """Fields of the table ROWS: rows of the narrow phase (ContactRows), and the numbers of the active rows."""
 nodes_of = table_of(NODES_OF, *_KINDS[NODES_OF])
-"""Fields of the table NODES_OF, for the surface nodes: Surface, v(n-1/2), impulse of the step, zone."""
+"""Fields of the table NODES_OF, for the surface nodes: fields of Surface, velocity v(n-1/2), impulse of the step,
+zone."""
 room_of = table_of(ROOM, *_KINDS[ROOM])
 """Fields of the table ROOM: ActiveNodes; row, slots, reach and set of each contact; places, slot, touched, shared
 (slot_numbers.py); Loaded, Braced."""
@@ -45,23 +46,23 @@ stored_of = table_of(STORED, *_KINDS[STORED])
 bounds_of = table_of(BOUNDS, *_KINDS[BOUNDS])
 """Fields of the table BOUNDS: walls and symmetry planes that stop nodes, and nodes without tets."""
 bodies_of = table_of(BODIES, *_KINDS[BODIES])
-"""Fields of the table BODIES, for the nodes of the rank: velocity, part, whether the rank owns the node."""
+"""Fields of the table BODIES, for the nodes of the rank: velocity, part, and flag for nodes that the rank owns."""
 books_of = table_of(BOOKS, *_KINDS[BOOKS])
 """Fields of the table BOOKS, for the nodes of the rank: energy lost by contact, external work."""
 step_of = table_of(STEP, *_KINDS[STEP])
 """Fields of the table STEP: integers, floating point numbers, control word of the program."""
 sums_of = table_of(SUMS, *_KINDS[SUMS])
 """Fields of the table SUMS. For each task: contacts that need an impulse; contacts of each set, and first row of each
-set; touched nodes; largest velocity. For each set: work along the normals, work of friction. For each task: residual,
-impulses of the parts."""
+set; touched nodes; largest velocity. For each set: work along the normals, and work of friction. For each task:
+residual, and impulses of the parts."""
 
 CONTACTS_N, NODES_N, SLOTS_N, PAIRS_N, CRACKS_N, ONE, TURN, SWEEPS, WORKS, COUNTS = range(10)
-"""Indices of the integers: numbers of active contacts; surface nodes; slots; node-face pairs; node pairs across cracks;
-the number 1; number of the sweep; sweeps of the step; which work is computed: 1 along the normals, 2 of friction, 3
-both."""
+"""Indices of the integers: number of active contacts; of surface nodes; of slots; of node-face pairs; of node pairs
+across cracks; the number 1; number of the present sweep; number of sweeps of the step; and a number for the work that
+is computed: 1 along the normals, 2 of friction, 3 both."""
 DT, RATIO, SCALE, FASTEST, SIZE, JOULE, RUB, REALS = range(8)
-"""Indices of the floating point numbers: time step, s; factor of the stored impulses; quanta per N s; bound of the
-velocities, m/s; size of a face, m; quanta per J of the account and of friction."""
+"""Indices of the floating point numbers: time step, s; factor of the stored impulses; quanta per N s; upper bound of
+the velocities, m/s; size of a face, m; quanta per J of the account, and of friction."""
 
 
 def handle() -> Handle:

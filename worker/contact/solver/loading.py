@@ -1,7 +1,7 @@
-"""Selection of the contacts that are swept; a contact is loaded if it has needed an impulse in the step; all other
+"""Selection of the contacts that are swept. A contact is loaded if it has needed an impulse in the step; all other
 contacts are idle.
 
-An idle contact closes more slowly than allowed; it needs no new test until sweeps have changed the velocities of its
+An idle contact closes more slowly than allowed, and needs no new test until sweeps have changed the velocities of its
 nodes by more than a margin, its ``reach``. The reach of loaded contacts is infinite. The data of loaded contacts are
 contiguous in memory.
 """
@@ -24,8 +24,8 @@ _ROWS, _F1, _F, _I = types.int32[::1], types.float64[::1], types.float64, types.
 
 @njit(types.void(LOADED, CONTACTS, NODES, _I, _I), cache=True, error_model="numpy")
 def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
-    """Writes the data of the loaded contacts from ``first`` to ``end``, with zero impulses; on entry ``loaded.row`` has
-    the numbers of these contacts, on return their rows.
+    """Writes the data of the loaded contacts from ``first`` to ``end``, with zero impulses. On entry ``loaded.row`` has
+    the numbers of the contacts; on return it has the rows of the contacts.
 
     The row norms are bounds of the l1 norms along the normal and across it, 1/kg; infinite if all nodes are held.
     """
@@ -57,8 +57,8 @@ def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
 @njit(_I(_ROWS, CONTACTS, _F1, _I, _I), cache=True)
 def _due(due, contacts, path, first, end):  # type: ignore[no-untyped-def]
     """Finds the contacts from ``first`` to ``end`` whose nodes have changed their velocities at least as much as the
-    reach of the contact. ``path`` (slots,): sum of the velocity changes of each slot. Returns the number of these
-    contacts.
+    reach of the contact. ``path`` (slots,): sum of the velocity changes of each slot. Returns the number of the
+    contacts that were found.
 
     Every sweep tests all contacts, and few of them pass the test. A test takes 1 ns; with signed slot numbers it would
     take 2 ns.
@@ -127,8 +127,8 @@ def load(loaded, contacts, active, fastest, k):  # type: ignore[no-untyped-def]
 
 @njit(types.void(LOADED, CONTACTS, NODES, KEPT, _I), cache=True)
 def load_kept(loaded, contacts, active, kept, k):  # type: ignore[no-untyped-def]
-    """Adds those contacts of set ``k`` that have a stored impulse ``kept`` of the last step to the loaded contacts. On
-    entry all contacts of the set are idle.
+    """Adds those contacts of set ``k`` that have a stored impulse (``kept``) of the last step to the loaded contacts.
+    On entry all contacts of the set are idle.
     """
     pair, pairs, cracks, first = contacts.pair, kept.pairs, kept.cracks, loaded.begin[k]
     n = first

@@ -1,4 +1,4 @@
-"""Test whether the active contacts of a step need no impulse. The solver has nothing to do in such a step.
+"""Test whether the active contacts of a step need no impulse. If so, the solver has nothing to do.
 
 A step is quiet under three conditions: no active contact has a stored impulse; no active contact closes faster than its
 target; no node of an active contact would end the step behind a wall or a symmetry plane. In a quiet step the sweeps
@@ -16,7 +16,7 @@ _F, _N1, _I = types.float64, types.int32[::1], types.int64
 
 @njit(types.boolean(STOPS, SURFACE, types.boolean[::1], _F, types.int64), cache=True)
 def _stopped(stops, nodes, loose, dt, a):  # type: ignore[no-untyped-def]
-    """Whether node ``a`` would end a step of length ``dt``, s, behind a plane of ``stops``; see stops.find and
+    """True if node ``a`` would end a step of length ``dt``, s, behind a plane of ``stops``; see stops.find and
     stops.stop.
     """
     x, v, mobility, part, local = nodes
@@ -37,8 +37,8 @@ def _stopped(stops, nodes, loose, dt, a):  # type: ignore[no-untyped-def]
 
 @njit(_I(CONTACT_ROWS, _N1, KEPT, STOPS, SURFACE, types.boolean[::1], _F, _I, _I), cache=True)
 def needs_impulse(rows, found, kept, stops, nodes, loose, dt, first, stop):  # type: ignore[no-untyped-def]
-    """Returns 1 if one of the contacts ``found`` from ``first`` to ``stop`` may need an impulse in a step of length
-    ``dt``, s, else 0. ``rows``: rows of the narrow phase; ``kept``: stored impulses; ``nodes``: surface nodes;
+    """Returns 1 if at least one of the contacts ``found`` from ``first`` to ``stop`` may need an impulse in a step of
+    length ``dt``, s, else 0. ``rows``: rows of the narrow phase; ``kept``: stored impulses; ``nodes``: surface nodes;
     ``loose`` (nodes,): nodes without tets.
     """
     for q in range(first, stop):

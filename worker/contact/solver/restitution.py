@@ -2,9 +2,9 @@
 
 If the normal velocity is u- before the step and u+ after it, an impulse J takes the energy -J (u- + u+) / 2 from the
 bodies. The target of a contact that closes is u+ = -e u- (Newton's law for each contact), so that this energy is -J u-
-(1 - e) / 2. For e = 1 the energy is zero for any number of contacts that share nodes, because contacts without an
-impulse take no energy. For e = 1, the impulse is the reflection in the metric of the masses of Cirak and West (2005),
-Decomposition contact response, Int. J. Numer. Meth. Engng 64.
+(1 - e) / 2. With the coefficient of restitution e = 1 the energy is zero for any number of contacts that share nodes,
+because contacts without an impulse take no energy. For e = 1, the impulse is the reflection in the metric of the masses
+of Cirak and West (2005), Decomposition contact response, Int. J. Numer. Meth. Engng 64.
 """
 
 from ...kernels.jit import njit, types
@@ -33,7 +33,7 @@ def rebound(rows, found, v, before, share, first, stop):  # type: ignore[no-unty
 
 @njit(types.void(CONTACT_ROWS, _N1, _V, _I, _I), cache=True)
 def hold_back(rows, found, before, first, stop):  # type: ignore[no-untyped-def]
-    """Lowers the target velocity of contacts that separated at the speed u- > 0 to at most -u-, because a higher target
+    """Lowers the target velocity of contacts that were separating at the speed u- > 0 to at most -u-. A higher target
     would return energy that contact did not take. The contacts are ``found`` from ``first`` to ``stop``; ``before``
     (slots, 3): v(n-1/2), from which u- is computed.
     """

@@ -1,9 +1,9 @@
 """Sums over the ranks that share a node with an impulse.
 
 In a step, most nodes that two ranks share get no impulse from either rank. Therefore the ranks first exchange two bits
-for each shared node: whether the rank has an active contact of the node; and whether it needs the sum, because it has
-such a contact or has the node. In the step, a sum is sent only if one rank has a contribution and the other rank needs
-the sum. Sums are integers, and contributions that are not sent are zero.
+for each shared node: the first is 1 if the rank has an active contact of the node; the second is 1 if the rank needs
+the sum, because it has such a contact or has the node. Later in the step, a sum is sent only if one rank has a
+contribution and the other rank needs the sum. Sums are integers, and contributions that are not sent are zero.
 """
 
 import numpy as np
@@ -16,9 +16,9 @@ from ...parallel.tags import Tag
 from ..narrow_phase.rows import ActiveRows
 
 _WORD = 63
-"""Number of bits used in a word of flags."""
+"""Number of bits that are used in a word of flags."""
 _ROOM = 4
-"""Number of words by which the messages of a rank are enlarged; chosen value: about 250 separated nodes fit before new
+"""Number of words by which the messages of a rank are enlarged. Chosen value: about 250 separated nodes fit before new
 messages are needed."""
 _COLUMNS = 4
 """Largest number of columns summed at once (active.ActiveNodes.row_weights)."""
@@ -28,7 +28,7 @@ class SharedSums:
     """Flags of the shared slots for every other rank, and the messages that exchange these flags."""
 
     def __init__(self, neighbours: list[Neighbour], comm: Comm) -> None:
-        """``neighbours``: shared slots for each other rank. The two ranks have the slots in the same order."""
+        """``neighbours``: shared slots for each other rank, in an order that is equal on both ranks."""
         self._comm = comm
         self._words = np.zeros(0, np.int64)
         self._exchange: Exchange | None = None
@@ -106,7 +106,7 @@ class ActiveSum:
 
 
 def _parts(words: Ints, ranks: list[int], counts: Ints) -> list[tuple[int, Ints]]:
-    """Returns the range of rows of each rank; ranks without rows are left out."""
+    """Returns the range of rows of each rank. Ranks without rows are left out."""
     parts, end = [], 0
     for rank, many in zip(ranks, counts.tolist(), strict=True):
         end += many
@@ -117,8 +117,8 @@ def _parts(words: Ints, ranks: list[int], counts: Ints) -> list[tuple[int, Ints]
 
 @njit("void(int64[::1], int32[::1], int64[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
 def _flag(out, nodes, ends, words, contacts, local):  # type: ignore[no-untyped-def]
-    """Writes the bits of the shared nodes of each rank into ``out``: first whether this rank has an active contact of
-    the node, then whether it needs the sum."""
+    """Writes two bits for each shared node of each rank into ``out``: one that is set if this rank has an active
+    contact of the node, and one that is set if this rank needs the sum."""
     pushed = np.zeros(len(local), np.bool_)
     for p in range(len(contacts)):
         for k in range(4):
@@ -140,8 +140,8 @@ def _flag(out, nodes, ends, words, contacts, local):  # type: ignore[no-untyped-
     cache=True,
 )
 def _agreed(mine, theirs, nodes, ends, words):  # type: ignore[no-untyped-def]
-    """Returns the nodes to send and the nodes to receive, ordered by rank, and for each rank the number of nodes to
-    send and to receive (ranks, 2).
+    """Returns two lists of nodes, ordered by rank: the nodes to send, and the nodes to receive. Also returns, for each
+    rank, the number of nodes to send and the number of nodes to receive (ranks, 2).
     """
     sends, receives = np.empty(len(nodes), np.int32), np.empty(len(nodes), np.int32)
     counts = np.zeros((len(ends) - 1, 2), np.int64)

@@ -1,9 +1,9 @@
 """Numbering of the nodes of active contacts. The kernels copy data between local nodes, surface nodes of the scene and
 slots of the solver.
 
-``held`` (h,) are rows of surface nodes and ``local`` (h,) the local indices of the same nodes. ``places`` (slots,) are
-the rows of the nodes of active contacts, and ``index`` (surface_nodes,) the local index of each surface node, -1 for a
-ghost of a node of another rank.
+``held`` (h,): rows of surface nodes; ``local`` (h,): local indices of the same nodes; ``places`` (slots,): rows of the
+nodes of active contacts; ``index`` (surface_nodes,): local index of each surface node, -1 for a ghost of a node of
+another rank.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ _SMALL = 16
 """Number of low bits of an impulse that the residual ignores. The ignored part is below 2^-30 of the largest impulse
 (fixed_point.py), so that the sum over 2^28 nodes does not overflow."""
 _AHEAD = 16
-"""Distance, in nodes, by which data of nodes are prefetched."""
+"""Distance, in nodes, by which kernels prefetch the data of nodes."""
 _I2, _N1, _N2, _U1 = types.int64[:, ::1], types.int32[::1], types.int32[:, ::1], types.uint8[::1]
 _F1, _F2, _F, _I, _I1, _B1 = (
     types.float64[::1], types.float64[:, ::1], types.float64, types.int64, types.int64[::1], types.boolean[::1],
@@ -87,8 +87,8 @@ def set_offsets(begin, begins, many, tasks):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_N1, _N1, _U1, _I, _I, _I), cache=True)
 def number(places, slot, touched, n, first, stop):  # type: ignore[no-untyped-def]
-    """Numbers the ``touched`` surface nodes from ``first`` to ``stop`` in their order, with numbers from ``n`` on;
-    clears the flags ``touched``. ``slot`` (surface_nodes,) becomes the inverse of ``places``.
+    """Numbers the ``touched`` surface nodes from ``first`` to ``stop`` in their order; the numbers start at ``n``.
+    Clears the flags ``touched``. ``slot`` (surface_nodes,) becomes the inverse of ``places``.
     """
     for a in range(first, stop):
         if touched[a]:
@@ -98,8 +98,8 @@ def number(places, slot, touched, n, first, stop):  # type: ignore[no-untyped-de
 
 @njit(types.void(_N1, _N2, _F1, _I2, _N1, _N1, _N2, _N1, _I, _I, _I), cache=True)
 def sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop):  # type: ignore[no-untyped-def]
-    """Orders the contacts ``found`` from ``first`` to ``stop`` by their sets, as idle contacts: writes their rows and
-    slots, and the ``reach`` -1, with which every contact is computed in the first sweep.
+    """Orders the contacts ``found`` from ``first`` to ``stop`` by their sets, as idle contacts. Writes their rows,
+    their slots, and the ``reach`` -1, so that every contact is computed in the first sweep.
 
     ``begins`` (tasks, sets): offset of this task in each set, which is advanced to its end; ``slot`` (surface_nodes,):
     see ``number``.

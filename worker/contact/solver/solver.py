@@ -24,9 +24,9 @@ _NONE: Indices = np.zeros(0, np.int32)
 _ROW_WEIGHTS = 4
 """Number of columns of ``ActiveNodes.row_weights``."""
 _SPARE = 1.25
-"""Ratio of the allocated rows to the present number of nodes or contacts; while a body breaks, these numbers increase
-in nearly every step, and each new allocation takes time because the operating system clears new pages. Chosen value: a
-bar of glass has a quarter more rows after 400 steps."""
+"""Ratio of the number of allocated rows to the present number of nodes or contacts. While a body breaks, the numbers of
+nodes and contacts increase in nearly every step, and each new allocation takes time because the operating system clears
+new pages. Chosen value: a bar of glass has a quarter more rows after 400 steps."""
 
 
 class Bodies(Protocol):
@@ -39,8 +39,8 @@ class Bodies(Protocol):
         """Finds the slots that belong to rigid bodies."""
 
     def weigh(self, active: ActiveNodes) -> None:
-        """Sets the row weights of the slots of rigid bodies. This function must be called after all contacts have added
-        their row weights. Collective.
+        """Sets the row weights of the slots of rigid bodies; to be called after all contacts have added their row
+        weights. Collective.
         """
 
     def give(self, active: ActiveNodes) -> None:
@@ -65,9 +65,9 @@ class ActiveSet:
         """``scale``: quanta per N s, a power of two; ``near``: walls and symmetry planes; ``bodies``: rigid bodies."""
         self.scale, self.stops, self._bodies = scale, near, bodies
         self.places: Indices = np.zeros(0, np.int32)
-        """(slots,) rows in the scene of the nodes that were slots in the last step."""
+        """(slots,) rows, in the scene, of the nodes that were slots in the last step."""
         self.tests_rest = True
-        """Whether a test is made first whether the contacts of a step need impulses."""
+        """True if the solver first tests whether the contacts of a step need impulses."""
         self._zones = Zones(team.threads)
         self._room = _Room(0, 0, near.sides.shape, self._zones.many)
         self._handle, (self._counts, self._reals) = layout.handle(), layout.numbers()
@@ -75,14 +75,12 @@ class ActiveSet:
         self._stored = True
 
     def go_on(self, scale: float, sides: Floats) -> None:
-        """Sets the scale, and the ``sides`` of the stops. This function must be called after a restart or a
-        repartition.
-        """
+        """Sets the scale, and the ``sides`` of the stops; to be called after a restart or a repartition."""
         self.scale, self._stored = scale, True
         self.stops = self.stops._replace(sides=sides.reshape(self.stops.sides.shape))
 
     def _stages(self, team: Team) -> Program:
-        """Returns the stages of a step. The order is that of their numbers."""
+        """Returns the stages of a step, in the order of their numbers."""
         table, counts, control = self._handle.address, self._counts, np.zeros(1, np.int64)
         self._handle.set(layout.STEP, counts, self._reals, control)
         border, inner = zones.tasks(self._zones.many)
@@ -109,7 +107,7 @@ class ActiveSet:
         return Program(team, every, control)
 
     def bind(self, step: SolverStep) -> None:
-        """Begins a step: sets the arguments of all stages."""
+        """Begins a step. Sets the arguments of all stages."""
         self._step, rows, nodes = step, step.rows, step.nodes
         if rows.n > len(self._room.row) or nodes.n > len(self._room.touched):
             of = int(_SPARE * rows.n), int(_SPARE * nodes.n)
@@ -130,7 +128,7 @@ class ActiveSet:
 
     def solve(self, step: SolverStep, shared: ActiveSum) -> bool:
         """Computes the impulses of a step, applies them, and adds their work to the accounts. ``shared``: sums over
-        ranks. Returns whether a node of this rank got an impulse.
+        ranks. Returns True if a node of this rank received an impulse.
         """
         self.bind(step)
         if not len(shared.shared) and self._bodies is None:
@@ -154,7 +152,7 @@ class ActiveSet:
         return False
 
     def begin(self, shared: ActiveSum) -> None:
-        """Numbers the contacts and the nodes of the contacts. ``shared``: sums over ranks."""
+        """Gives numbers to the contacts and to their nodes. ``shared``: sums over ranks."""
         room, self._sum = self._room, shared
         room.touched[shared.shared] = room.shared[shared.shared] = 1
         self._program.run(stages.MARK, stages.SORT)
@@ -238,8 +236,9 @@ class ActiveSet:
             impulse_work.between(books.pairs, room.loaded, self.places, step.nodes.part, self.scale, k)
 
     def leave(self) -> bool:
-        """Copies velocities to the local nodes. Adds the impulses to the impulses of the scene, to the sums of the
-        parts and to the residual, and adds half of their work. Returns whether there was any impulse.
+        """Copies velocities to the local nodes. Adds the impulses to three sums: the impulses of the scene, the
+        impulses of the parts, and the residual. Adds half of the work of the impulses. Returns True if there was any
+        impulse.
         """
         self._program.run(stages.LEAVE, END)
         return self._left()
@@ -255,8 +254,8 @@ class ActiveSet:
         return bool(left[2])
 
     def press(self, pressed: Ints) -> None:
-        """Adds the impulses of rigid bodies in the step to ``pressed`` (nodes, 3), quanta. Nothing is done if
-        ``pressed`` has no rows.
+        """Adds the impulses of rigid bodies in the step to ``pressed`` (nodes, 3), quanta. Does nothing if ``pressed``
+        has no rows.
         """
         if self._bodies is not None and len(pressed):
             self._bodies.add_pressed(pressed)

@@ -1,7 +1,7 @@
 """Stages of the solver: kernels over contacts, nodes, slots and sets of contacts. The tables of the stages are in
 layout.py.
 
-The kernel ``number`` and kernels without a range are run by one thread.
+One thread runs the kernel with the name ``number`` and the kernels that have no range.
 """
 
 from ...kernels.jit import njit
@@ -34,21 +34,21 @@ from .layout import (
 from .quiet import needs_impulse
 
 CONTACTS_OF_A_TASK, SLOTS_OF_A_TASK, KEPT_OF_A_TASK = 1024, 2048, 8192
-"""Numbers of contacts, of nodes or slots, and of stored impulses in a task. Chosen values: a task takes some 20 us,
-compared with 2 us to start a parallel region."""
+"""Three numbers in a task: of contacts, of nodes or slots, and of stored impulses. Chosen values: a task takes about 20
+us, compared with 2 us to start a parallel region."""
 (
     QUIET, REST, MARK, COUNT, ORDER, NUMBER, SORT, LOAD, BEGIN, WEIGH, RESUME, START, SWEEP, GIVE, TURN_OVER,
     CLEAR_PAIRS, CLEAR_CRACKS, STORE, WORK, LEAVE, END,
 ) = range(21)  # fmt: skip
-"""Numbers of the stages in the order of execution, and the number of the end."""
+"""Numbers of the stages in the order of execution, and the number that ends the program."""
 WEIGH_BORDER, RESUME_BORDER, SWEEP_BORDER, STORE_BORDER, WORK_BORDER, RESTED = range(END, END + 6)
-"""Numbers of the stages over contacts with a node that other ranks share; and the number with which a step ends if it
-needs no impulse."""
+"""Numbers of the stages over contacts with a node that other ranks share; and number of the next stage if a step needs
+no impulse."""
 
 
 @njit(TASK, cache=True)
 def quiet(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: writes 1 if a contact of the range may need an impulse, else 0."""
+    """Task: writes 1 if a contact of its range may need an impulse, else 0."""
     rows, found = rows_of(table)
     (kept,), (planes, loose), (_, reals, _) = stored_of(table), bounds_of(table), step_of(table)
     flags = sums_of(table)[0]
@@ -59,7 +59,7 @@ def quiet(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def rest(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Ends the program if no contact needs an impulse: RESTED becomes the number of the next stage."""
+    """Ends the step if no contact needs an impulse: RESTED becomes the number of the next stage."""
     (counts, _, control), flags = step_of(table), sums_of(table)[0]
     many = (counts[CONTACTS_N] + CONTACTS_OF_A_TASK - 1) // CONTACTS_OF_A_TASK
     for k in range(many):
@@ -70,7 +70,7 @@ def rest(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def mark(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``slot_numbers.mark``."""
+    """Task: runs ``slot_numbers.mark`` for a range of contacts."""
     (rows, found), zone, many = rows_of(table), nodes_of(table)[3], sums_of(table)[1]
     _, _, _, _, set_of, _, _, touched, shared, _, _ = room_of(table)
     k = first // CONTACTS_OF_A_TASK
@@ -104,14 +104,14 @@ def order(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def number(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``slot_numbers.number``."""
+    """Task: runs ``slot_numbers.number`` for a range of nodes."""
     _, _, _, _, _, places, slot, touched, _, _, _ = room_of(table)
     slot_numbers.number(places, slot, touched, sums_of(table)[3][first // SLOTS_OF_A_TASK], first, stop)
 
 
 @njit(TASK, cache=True)
 def sort(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``slot_numbers.sort``."""
+    """Task: runs ``slot_numbers.sort`` for a range of contacts."""
     (rows, found), begins = rows_of(table), sums_of(table)[2]
     _, row, slots, reach, set_of, _, slot, _, _, _, _ = room_of(table)
     k = first // CONTACTS_OF_A_TASK
@@ -120,7 +120,7 @@ def sort(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def load(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``slot_numbers.load``, then finds the slots near stops and stops these slots."""
+    """Task: runs ``slot_numbers.load`` for a range of slots, then finds the slots near stops and stops these slots."""
     active, _, _, _, _, places, _, _, _, _, braced = room_of(table)
     nodes = nodes_of(table)[0]
     (planes, loose), (_, reals, _) = bounds_of(table), step_of(table)
@@ -133,7 +133,7 @@ def load(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def begin(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Sets the bound of the velocities of the slots to the maximum over the tasks."""
+    """Sets the upper bound of the velocities of the slots to the maximum over the tasks."""
     (counts, reals, _), fastest, most = step_of(table), sums_of(table)[4], 0.0
     for k in range((counts[SLOTS_N] + SLOTS_OF_A_TASK - 1) // SLOTS_OF_A_TASK):
         most = max(most, fastest[k])
@@ -169,7 +169,7 @@ def sweep(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def give(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``sweeps.give``, then stops the slots at walls and symmetry planes."""
+    """Task: runs ``sweeps.give`` for a range of slots, then stops the slots at walls and symmetry planes."""
     room, (counts, reals, _) = room_of(table), step_of(table)
     sweeps.give(room[0], reals[SCALE], counts[TURN] + 1 == counts[SWEEPS], first, stop)
     planes = len(bounds_of(table)[0].points)
@@ -179,7 +179,7 @@ def give(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def turn(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Increases the number of the sweep by one. Until all sweeps are done, the next stage is SWEEP."""
+    """Increases the number of the present sweep by one. Until all sweeps are done, the next stage is SWEEP."""
     counts, _, control = step_of(table)
     counts[TURN] += 1
     if counts[TURN] < counts[SWEEPS]:

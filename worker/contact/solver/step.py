@@ -18,25 +18,25 @@ class SolverStep:
     nodes: SurfaceNodes
     """Surface nodes with their positions, and their velocities before contact."""
     before: Floats
-    """(surface_nodes, 3) v(n-1/2), m/s."""
+    """(surface_nodes, 3) velocities v(n-1/2), m/s."""
     total: Ints
     """(surface_nodes, 3) impulses of the step, quanta; the solver writes this array."""
     state: Nodes
     """Nodes of the rank; the solver writes their velocities."""
     loose: Flags
-    """(nodes,) whether each node has no tets."""
+    """(nodes,) True for each node that has no tets."""
     books: Books
     """Accounts of energies and impulses; the solver adds to them."""
     unsettled: Ints
     """(2,) residual of the sweeps (sweep_count.py); the solver writes this array."""
     kept: Kept
-    """Stored impulses of the last step; the solver replaces them by those of this step."""
+    """Stored impulses of the last step. The solver replaces the stored impulses by the impulses of this step."""
     ratio: float
-    """Factor of the stored impulses at the start of the step."""
+    """Factor by which the stored impulses are multiplied at the start of the step."""
     sweeps: int
     """Number of sweeps."""
     rubs: bool
-    """Whether any contact has friction."""
+    """True if any contact has friction."""
     size: float
     """Typical size of a face, m."""
     dt: float

@@ -24,8 +24,8 @@ from ...scene.selection import named
 from .active import MOBILITY, NODES, V
 
 _NEAR = 0.25
-"""Ratio of the distance from a plane to the typical size of a face. Nodes with a larger ratio are ignored; chosen
-value: no step moves a node so far (clock.py). If a step did, the boundary would still stop the node."""
+"""Ratio of the distance of a node from a plane to the typical size of a face. Nodes with a larger ratio are ignored.
+Chosen value: no step moves a node so far (clock.py). If a step did, the boundary would still stop the node."""
 
 
 class Stops(NamedTuple):
@@ -39,14 +39,14 @@ class Stops(NamedTuple):
     """(k, parts) 1 for a part in front of the plane, -1 for a part behind it, 0 for a part that the plane does not
     hold."""
     friction: Floats
-    """(k,) Coulomb's coefficient."""
+    """(k,) Coulomb's coefficient of friction of each plane."""
     mirrors: Flags
-    """(k,) whether each plane is a symmetry plane. Nodes without tets may pass symmetry planes."""
+    """(k,) True for each plane that is a symmetry plane. Nodes without tets may pass symmetry planes."""
 
     @classmethod
     def of(cls, case: Case, model: Model, comm: Comm) -> "Stops":
-        """Returns the walls and symmetry planes of a case. For a part with nodes on both sides of a plane there is no
-        stop at this plane; only the boundary acts on such a part. Prescribed motions are not considered, only held
+        """Returns the walls and symmetry planes of a case. If a part has nodes on both sides of a plane, there is no
+        stop for the part at this plane; only the boundary acts on it. Prescribed motions are not considered, only held
         components. Collective.
         """
         walls, planes = case.boundaries_of(schema.Wall), case.boundaries_of(schema.Symmetry)
@@ -78,8 +78,8 @@ class Surface(NamedTuple):
 
 
 class Braced(NamedTuple):
-    """Slots near stops. There is one row for each pair of a slot and a stop. The rows of a task, which has a range of
-    slots, begin at the number of its first slot times the number of stops.
+    """Slots near stops. The table has one row for each pair of a slot and a stop. A task has a range of slots; its rows
+    begin at the number of its first slot times the number of stops.
     """
 
     rows: Indices

@@ -1,4 +1,4 @@
-"""Number of sweeps in a step; it is adapted to the residual of the previous step."""
+"""Number of sweeps in a step, which is adapted to the residual of the previous step."""
 
 import numpy as np
 
@@ -7,19 +7,23 @@ from conoid.cases.estimates.impact import Sweeps
 from ...model.state import Ints
 
 _SETTLED = 0.0015
-"""Target of the residual, which is the ratio of the change of the impulses by the last sweep to the impulses of the
-step. Chosen value: with it, rubble between a ram and walls is as stiff as with many more sweeps
-(docs/theory/contact.md, "Sweeps by need"). Metals are below the target with the smallest number of sweeps."""
+"""Target of the residual. The residual is the change of the impulses by the last sweep, divided by the impulses of the
+step. Chosen value: rubble between a ram and walls is as stiff as with many more sweeps (docs/theory/contact.md, "Sweeps
+by need"). Metals are below the target with the smallest number of sweeps."""
 _ENOUGH = 0.5
-"""Fraction of the target; if the residual is below this fraction, the number of sweeps is reduced by one."""
+"""Fraction of the target. If the residual is below this fraction of the target, the number of sweeps is reduced by
+one."""
 _MORE = 4
 """Inverse of the fraction by which the number of sweeps is increased in a step."""
 _WARNED = 2.0
-"""Multiple of _SETTLED. If the residual of the whole run is above this multiple, a warning is given. Chosen value."""
+"""Multiple of _SETTLED. If the mean residual of the run is above this multiple, the run gives a warning. Chosen
+value."""
 
 
 class SweepCount:
-    """Number of sweeps; it is determined by integer sums over all nodes, so it is equal for any number of ranks."""
+    """Number of sweeps in a step, determined by integer sums over all nodes, and therefore equal for any number of
+    ranks.
+    """
 
     def __init__(self, bounds: Sweeps) -> None:
         self._bounds = bounds
@@ -27,8 +31,7 @@ class SweepCount:
         """Number of sweeps in the next step."""
         self.unsettled: Ints = np.zeros(2, np.int64)
         """(2,) l1 norms over the nodes that this rank owns, in units of 2^16 quanta: of the changes of impulses by the
-        last sweep of the step, and of the impulses of the step.
-        """
+        last sweep of the step, and of the impulses of the step."""
         self._changed, self._impulse = 0, 0
 
     def known(self) -> tuple[int, int, int]:

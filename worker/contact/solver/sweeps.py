@@ -1,16 +1,17 @@
 """Impulses of active contacts: projected Jacobi sweeps, independent of the order of contacts (docs/theory/contact.md).
 
-Every contact has a target for its normal velocity: u >= ``wanted``. A sweep corrects the impulse of a contact by
-(wanted - u) / bound. The bound is a bound of the l1 norm of the contact's row of the contact matrix (Baker, Falgout,
-Kolev and Yang 2011): the sum over its nodes k and axes i of |w_k| |n_i| S_ki / m_k, where S_ki is the sum of |w| |n_i|
-over all contacts at the node. The correction is exact for a single contact and for any number of contacts along one
-normal, and never overshoots when contacts share nodes. If many contacts share a node, the bound is far above the
-diagonal of the matrix, and plain sweeps converge slowly. Therefore normal impulses are extrapolated by Nesterov's
-``momentum``; normal impulses are never negative. Friction is Coulomb friction and is limited by the normal impulse
-summed over the sweeps. Impulses are integers: the impulses of a contact add up to zero, and the result does not depend
-on the order of contacts or ranks. Node-face pairs and node pairs across a crack start from their impulses of the last
-step (warm start). With the warm start, for any number of sweeps, sticking contacts do not creep and the penetration of
-compressed contacts does not increase.
+Every contact has a target for its normal velocity u: u >= ``wanted``. A sweep corrects the impulse of a contact by
+(wanted - u) / bound. The value ``bound`` is an upper bound of the l1 norm of the contact's row of the contact matrix
+(Baker, Falgout, Kolev and Yang 2011): the sum over its nodes k and axes i of |w_k| |n_i| S_ki / m_k. Here w_k is the
+weight of node k, m_k its mass, n the normal, and S_ki the sum of |w| |n_i| over all contacts at the node. The
+correction is exact for a single contact and for any number of contacts along one normal, and never overshoots when
+contacts share nodes. If many contacts share a node, the bound is far above the diagonal of the matrix, and plain sweeps
+converge slowly. Therefore normal impulses are extrapolated by Nesterov's ``momentum``; normal impulses are never
+negative. Friction is Coulomb friction and is limited by the normal impulse summed over the sweeps. Impulses are
+integers: the impulses of a contact add up to zero, and the result does not depend on the order of contacts or ranks.
+Node-face pairs and node pairs across a crack start from their impulses of the last step (warm start). With the warm
+start, for any number of sweeps, sticking contacts do not creep and the penetration of compressed contacts does not
+increase.
 
 The sweeps include only contacts that have needed an impulse in this step (loading.py).
 
@@ -44,8 +45,8 @@ from .loading import SHARES
 
 _PAIR, _CRACK = 0.8, 1.0
 """Fractions of the stored normal impulse that the warm start applies: for node-face pairs, and for node pairs across a
-crack. For node-face pairs the whole impulse would be out of date by one step and would add energy. Node pairs across a
-crack get a larger fraction, because so many of them press on each other that the sweeps could not restore a missing
+crack. For node-face pairs the whole impulse would add energy, because it is out of date by one step. Node pairs across
+a crack get a larger fraction, because so many of them press on each other that the sweeps could not restore a missing
 part (docs/theory/contact.md, "Dust under pressure")."""
 
 _ROWS, _F, _I = types.int32[::1], types.float64, types.int64
@@ -68,7 +69,7 @@ def add_row_weights(active, contacts, loaded, k):  # type: ignore[no-untyped-def
 
 @njit(types.void(NODES, LOADED, KEPT, _ROWS, _F, _F, _I), cache=True)
 def resume(active, loaded, kept, pair, ratio, scale, k):  # type: ignore[no-untyped-def]
-    """Warm start of the loaded contacts of set ``k``. The start value is ``ratio`` times the stored impulses ``kept``,
+    """Warm start of the loaded contacts of set ``k``. The start value is ``ratio`` times the stored values ``kept``,
     along the present normal and across it, divided by the present row norms. The row norms reduce the start value of a
     node that has lost mass by separation, or that shares its load with new contacts.
     """
@@ -184,7 +185,7 @@ def give(active, scale, last, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(types.void(KEPT, LOADED, _ROWS, _I), cache=True)
 def store(kept, loaded, pair, k):  # type: ignore[no-untyped-def]
-    """Stores the impulses of the loaded contacts of set ``k``, times their row norms, in ``kept``."""
+    """Stores the impulses of the loaded contacts of set ``k`` in ``kept``, multiplied by their row norms."""
     pairs, cracks, normal, tangent, row = kept.pairs, kept.cracks, loaded.normal, loaded.tangent, loaded.row
     last = np.empty(4)
     for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k]):

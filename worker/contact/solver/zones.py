@@ -28,7 +28,7 @@ class Zones:
     """
 
     def __init__(self, threads: int) -> None:
-        """``threads``: number of threads, from which the number of zones is chosen; the number of zones is a power of
+        """``threads``: number of threads. The number of zones is chosen from the number of threads, and is a power of
         two.
         """
         self.many = 1 if threads == 1 else 1 << (_PER_THREAD * threads - 1).bit_length()
@@ -68,15 +68,15 @@ class Zones:
 
 
 def sets(zones: int) -> int:
-    """Two numbers: of the sets of contacts with a node that other ranks share, and of the sets of contacts without such
-    a node. The set of box k has the number ``sets(zones) - k``.
+    """Two counts: sets of contacts with a node that other ranks share, and sets of contacts without such a node. The
+    set of box k has the number ``sets(zones) - k``.
     """
     return 2 * zones - 1
 
 
 def tasks(zones: int) -> tuple[tuple[Ints, Ints], tuple[Ints, Ints]]:
     """Returns tasks and starts for a team, for two groups of sets: contacts with a node that other ranks share, and
-    contacts without such a node. The order is every zone, then every larger box; boxes of one size are swept
+    contacts without such a node. The order is: all zones, then all larger boxes. Boxes of the same level are swept
     simultaneously.
     """
     first = np.arange(sets(zones))

@@ -20,10 +20,10 @@ from ...parallel.ownership import Neighbour
 
 NEAR_EROSION = 0.5
 """Fraction of the limit of plastic strain or damage above which a tet is near erosion. In one run of the case long_rod
-to 20 us, 1.6 to 5.7 % of the eroded tets were below this fraction 50 to 200 steps before they eroded."""
+to 20 us, 1.6 to 5.7 % of the eroded tets were not near erosion 50 to 200 steps before they eroded."""
 WORDS = 9
-"""Number of words of a message about a tet that erodes. The words are its id, the faces across (state.Block.across),
-and its nodes."""
+"""Number of words of a message about a tet that erodes: its id, the faces across (state.Block.across), and its
+nodes."""
 
 
 class Exposure(NamedTuple):

@@ -64,7 +64,7 @@ class Families:
 
 @njit("void(int32[::1], int64[::1], int64)", cache=True)
 def _insert(ring, parents, first):  # type: ignore[no-untyped-def]
-    """Inserts copies into the rings, each after its parent. The numbers of the copies start at ``first``."""
+    """Inserts copies into the rings, each after its parent. The local indices of the copies start at ``first``."""
     for c in range(len(parents)):
         ring[first + c], ring[parents[c]] = ring[parents[c]], first + c
 
@@ -100,8 +100,8 @@ _read_gather, _read_spread, _read_count, _read_list = (
 
 
 class CornerLists:
-    """Passes of the threads that list the corners of narrow sides, ordered by family. The list is made by a counting
-    sort of the leaders of families, first by ranges of leaders, then within each range.
+    """Passes of the threads that list the corners of narrow sides, ordered by family. The list of corners is made by a
+    counting sort of the leaders of families, first by ranges of leaders, then within each range.
     """
 
     def __init__(self, team: Team) -> None:

@@ -20,7 +20,7 @@ _FACES, _BITS, _RANGES = 1024, 6, 4
 ranges in a task. Chosen values: a task takes about 20 us with 60,000 faces, compared with 2 us to start a parallel
 region."""
 _EACH = 3
-"""Number of edges for each face for which memory is reserved. It is a mean over the faces of a task."""
+"""Number of edges for each face for which memory is reserved, as a mean over the faces of a task."""
 _I, _F, _I1, _I2, _N1, _N2 = (
     types.int64, types.float64, types.int64[::1], types.int64[:, ::1], types.int32[::1], types.int32[:, ::1],
 )  # fmt: skip

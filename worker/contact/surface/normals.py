@@ -21,8 +21,8 @@ from ...parallel.team import TASK, Team
 from ..solver.loading import SHARES
 
 EVERY = 16
-"""Number of steps between two computations of the mean normals. In this time a fragment that rotates at 1e5 rad/s (100
-m/s over 1 mm) rotates by 3 degrees."""
+"""Number of steps between two computations of the mean normals. Between two computations a fragment that rotates at 1e5
+rad/s (100 m/s over 1 mm) rotates by 3 degrees."""
 COLUMNS, SHARE = 12, 18
 """Number of sums at a node; and number of words that a face adds to the sums of its three nodes."""
 _NOTHING = 1e-300

@@ -1,8 +1,8 @@
 """Tables of a surface: faces and edges, given by global node ids, and nodes with their state.
 
-A face has three nodes, counter-clockwise seen from outside, and the opposite node of its tet. An edge has its two
-nodes. It also has, for each of its two faces, the third node of the face and the opposite node of the tet. Ranks
-exchange these rows unchanged.
+A face has three nodes, counter-clockwise seen from outside, and the opposite node of its tet. An edge has its two nodes
+and, for each of its two faces, the third node of the face and the opposite node of the tet. Ranks exchange the rows of
+edges unchanged.
 """
 
 from collections.abc import Sequence

@@ -30,10 +30,10 @@ SHARP = sine_and_cosine(math.radians(25.0))[1]
 """Cosine of the smallest angle between the normals of the two faces of a sharp edge. Chosen value."""
 BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
 """Two values for parts that are pressed together beyond their strength (cases/estimates/impact.py): cosine of the
-smallest angle of a sharp edge, and number of steps between two checks. For such parts the angle is smaller than for
-other parts, because ridges of initially flat surfaces may cross without a node inside of the other body, and contact
-exerts no pressure on overlapping material. Chosen values, by tests of flyer plates of copper at 1 to 2.4 km/s
-(docs/theory/contact.md, "Ridges under pressure")."""
+smallest angle of a sharp edge, and number of steps between two checks. The angle is smaller for parts pressed together
+beyond their strength than for other parts, because ridges of initially flat surfaces may cross without a node inside of
+the other body, and contact exerts no pressure on overlapping material. Chosen values, by tests of flyer plates of
+copper at 1 to 2.4 km/s (docs/theory/contact.md, "Ridges under pressure")."""
 
 _A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _LOW, _NORMAL = range(11)
 """Columns of a half edge that is sent to another rank: its two nodes; the third node of its face and the opposite node

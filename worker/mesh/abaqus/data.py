@@ -13,8 +13,8 @@ from .elements import ElementType, Kind
 _AXIS = 7
 """Number of values of a rotation: two points and an angle."""
 _MOST_MADE = 20_000_000
-"""Largest number of members that one GENERATE line may make; the chosen value is more than the elements of a mesh that
-fits into some 100 GB of memory."""
+"""Largest number of members that one GENERATE line may make. Chosen value: it is more than the number of elements of a
+mesh that fits into about 100 GB of memory."""
 
 
 def element_rows(lines: Iterator[tuple[int, str]], kind: ElementType) -> Iterator[tuple[int, list[str]]]:
@@ -69,8 +69,8 @@ def numbers_of(line: int, text: str) -> "array[int]":
 
 
 def _step(line: int, items: list[str]) -> int:
-    """Return the increment, which is the third number of the line and may be 0; 1 if the line has no third number.
-    Raises MeshError.
+    """Return the increment: the third number of the line, which may be 0, or 1 if the line has no third number. Raises
+    MeshError.
     """
     if not items[2:]:
         return 1
@@ -99,6 +99,6 @@ def axis(line: int, text: str) -> tuple[float, ...]:
 
 
 def cylindrical(radius: float, angle: float, height: float) -> tuple[float, float, float]:
-    """Return the Cartesian coordinates of a point in cylindrical coordinates, ``angle`` in degrees."""
+    """Return the Cartesian coordinates of a point in cylindrical coordinates. ``angle`` is in degrees."""
     sine, cosine = sine_and_cosine(math.radians(angle))
     return radius * cosine, radius * sine, height

@@ -19,11 +19,11 @@ from .scopes import OWN, ElementSet, Instance, Rows, Scope, Surface
 
 _ROOT = Label("", "")
 _NODE_VALUES = 6
-"""Largest number of values of a node: coordinates and components of a normal (Keywords Guide, *NODE)."""
+"""Largest number of values of a node: coordinates, and components of a normal (Keywords Guide, *NODE)."""
 
 
 class Deck:
-    """The definitions of one file: parts, instances, and definitions outside of parts."""
+    """Definitions of one file: parts, instances, and definitions outside of parts."""
 
     def __init__(self, path: Path) -> None:
         """Read all of ``path``. Raises MeshError with the number of a line that cannot be read."""
@@ -100,8 +100,8 @@ class Deck:
         self._here = self.instances.add(name, Instance(name, block.line, part=part, move=move, axis=axis))
 
     def _placing(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Return the two data lines of *INSTANCE: a translation, then an axis with an angle. Each of the two lines may
-        be empty.
+        """Return the two data lines of *INSTANCE: a translation, then an axis with an angle. Each of the two data lines
+        may be empty.
         """
         lines = list(self._source.data())
         while lines and not lines[-1][1].strip():
@@ -220,8 +220,8 @@ class Deck:
             raise MeshError(f"line {line}: {shortened(item)} is no {what} that is defined above")
 
     def _surface(self, block: Block) -> None:
-        """Store a surface as it is written in the file. The elements of the surface may be defined later in the
-        file.
+        """Store a surface as it is written in the file. The file may define the elements of the surface at a later
+        place.
         """
         found = dict(block.parameters)
         kind, name = (found.get("TYPE") or "ELEMENT").upper(), found.get("NAME")

@@ -1,6 +1,6 @@
 """Element types of Abaqus and CalculiX: volumes that are read, volumes that are not read, and elements without volume.
 
-A name of a type consists of a family, the number of nodes, and letters for variants (Abaqus Elements Guide).
+The name of a type consists of a family, the number of nodes, and letters for variants (Abaqus Elements Guide).
 """
 
 import re
@@ -12,7 +12,7 @@ from ..cells import HEX8, HEX20, PYRAMID5, TET4, TET10, WEDGE6, WEDGE15, Form
 
 
 class Kind(Enum):
-    """Use of an element type in a mesh of tets."""
+    """Use of an element type in a mesh of tets: read, not read, or without volume."""
 
     SOLID = "a volume that is read"
     VOLUME = "another volume"
@@ -21,7 +21,7 @@ class Kind(Enum):
 
 
 FORMS = {4: TET4, 5: PYRAMID5, 6: WEDGE6, 8: HEX8, 10: TET10, 15: WEDGE15, 20: HEX20}
-"""Kinds of the volumes that are read, keyed by the number of nodes."""
+"""Kinds of the volumes that are read; the keys are the numbers of nodes."""
 FACES = {
     Form.TET: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
     Form.PYRAMID: ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),

@@ -32,8 +32,8 @@ MESH: dict[str, dict[str, bool]] = {
         "UNSORTED": False,
     },
 }
-"""Keywords that are read, with their parameters; the value of a parameter is True if the parameter has a value in the
-file. ``*SURFACE`` is also read; its parameters that are missing here do not affect a mesh."""
+"""Keywords that are read, with their parameters. The value of a parameter is True if the parameter has a value in the
+file. ``*SURFACE`` is also read. Parameters of ``*SURFACE`` that are missing here do not affect a mesh."""
 SURFACE = "SURFACE"
 
 REFUSED = _words(
@@ -43,7 +43,8 @@ REFUSED = _words(
     SUBSTRUCTURELOADCASE SYMMETRICMODELGENERATION SYMMETRICRESULTSTRANSFER SYSTEM
     """
 )
-"""Keywords that make, move or copy nodes and elements, or change their numbers; these keywords are not supported."""
+"""Keywords that make, move or copy nodes and elements, or change their numbers. The reader does not support keywords
+that change nodes or elements."""
 
 ANALYSIS = _words(
     """
@@ -123,7 +124,7 @@ ANALYSIS = _words(
     VOIDNUCLEATION VOLUMETRICTESTDATA WAVE WEARCONTROLS WIND XFEM
     """
 )
-"""Keywords of materials, loads, steps and output; the reader skips these keywords and their data lines."""
+"""Keywords of materials, loads, steps and output. The reader skips keywords of the analysis and their data lines."""
 
 
 JOINING = {
@@ -167,8 +168,8 @@ JOINING = {
         "TIE",
     )
 }
-"""Keywords of ``ANALYSIS``, in full, that join, hold, crack or remove bodies, or move nodes of bodies to each other;
-these keywords have no effect on the mesh."""
+"""Keywords of ``ANALYSIS``, in full, that join, hold, crack or remove bodies, or move nodes of bodies to each other.
+Keywords that join or hold bodies have no effect on the mesh."""
 
 
 def known(block: Block, in_step: bool = False) -> str:
@@ -192,8 +193,8 @@ def known(block: Block, in_step: bool = False) -> str:
 
 
 def options(block: Block, word: str) -> dict[str, str]:
-    """Return the parameters of a mesh keyword, keyed by their full names; the value of a parameter without value is an
-    empty text.
+    """Return the parameters of a mesh keyword as a dictionary; the keys are the full names of the parameters. A
+    parameter without value has an empty text as value.
 
     Raises MeshError.
     """

@@ -35,7 +35,7 @@ class Labelled(Generic[T]):
     """Named values of one scope of a file, in the order in which the file defines them."""
 
     def __init__(self) -> None:
-        """Start with no value."""
+        """Create an object without values."""
         self._found: dict[str, tuple[Label, T]] = {}
 
     def __iter__(self) -> Iterator[tuple[Label, T]]:
@@ -57,9 +57,9 @@ class Labelled(Generic[T]):
         return alike[0] if len(alike) == 1 else None
 
     def meant(self, wanted: str) -> list[tuple[Label, T]]:
-        """Return the candidates for ``wanted``, a name from outside of the file in any case of letters.
+        """Return the candidates for ``wanted``, a name from outside of the file whose letters may be in any case.
 
-        There are several candidates if names in the file differ in the case of letters alone.
+        There are several candidates if names in the file differ only in the case of letters.
         """
         words = {wanted.casefold(), _joined(wanted).casefold()}
         alike = [(name, value) for name, value in self if name.key.casefold() in words]

@@ -22,10 +22,10 @@ _NONE = np.zeros(0, np.int64)
 
 
 def named_sets(model: Placed) -> tuple[list[Named], list[str]]:
-    """Return the sets, and remarks on the sets that are not read.
+    """Return the sets. Also return remarks on the sets that are not read.
 
-    The set ``CLAMP`` of the part ``Bar`` has the name ``Bar.CLAMP``, or ``Bar-1.CLAMP`` in an instance; it also has the
-    name ``CLAMP`` if the assembly has no set of this name.
+    The set ``CLAMP`` of the part ``Bar`` has the name ``Bar.CLAMP``, or ``Bar-1.CLAMP`` in an instance. The set also
+    has the name ``CLAMP`` if the assembly has no set of this name.
     """
     remarks, lost = nodes_of_elements(model.deck), dict[str, Ids]()
     found = list(_sets(model, model.deck.root, None, remarks, lost))
@@ -89,7 +89,7 @@ def _surface(model: Placed, scope: Scope, given: Surface, place: int | None) -> 
 
 
 def _owners(model: Placed, scope: Scope, one: ElementSet, place: int | None) -> Iterator[tuple[str, int]]:
-    """Yield the scopes that own members of a set, and the pieces of the model in each scope."""
+    """Yield the scopes that contain members of a set, and the pieces of the model in each scope."""
     for owner in one.members:
         if owner == OWN and place is not None:
             yield owner, place
@@ -103,7 +103,9 @@ def _ids(one: ElementSet, owner: str) -> Ids:
 
 
 def nodes_of_elements(deck: Deck) -> list[str]:
-    """Fill each set of nodes that is defined by a set of elements. Return remarks on undefined sets of elements."""
+    """Fill each set of nodes that the file defines by a set of elements. Return remarks on undefined sets of
+    elements.
+    """
     remarks = []
     for scope in (deck.root, *(part for _, part in deck.parts), *(each for _, each in deck.instances)):
         for one, name, line in scope.node_sets_of:

@@ -31,7 +31,9 @@ class Placed:
     tags: list[Tags]
 
     def solids(self, place: int, wanted: Ids | None = None) -> Iterator[Cells]:
-        """Return the volume elements of a piece: the ``wanted`` numbers, or all. Raises MeshError."""
+        """Return the volume elements of a piece: the elements with the numbers ``wanted``, or all elements. Raises
+        MeshError.
+        """
         tags = self.tags[place]
         for kind, rows in self.pieces[place].mesh.solids.items():
             made = cells(FORMS[kind.nodes or 0], _ids(rows.numbers), _ids(rows.nodes), _ids(rows.lines))
@@ -61,13 +63,13 @@ class Placed:
             yield placed(tags.numbers, nodes[chosen], _called(kind, numbers[chosen])) + tags.first
 
     def nodes(self, place: int, numbers: Ids) -> Ids:
-        """Return the indices of the nodes ``numbers`` of a piece; undefined nodes are omitted."""
+        """Return the indices of the nodes ``numbers`` of a piece. Undefined nodes are omitted."""
         tags = self.tags[place]
         there = tags.numbers[np.isin(tags.numbers, numbers)]
         return np.asarray(np.searchsorted(tags.numbers, there) + tags.first, np.int64)
 
     def undefined(self, place: int, numbers: Ids) -> Ids:
-        """Return the ``numbers`` that belong to no node of a piece."""
+        """Return those ``numbers`` that no node of a piece has."""
         return np.setdiff1d(numbers, self.tags[place].numbers)
 
 

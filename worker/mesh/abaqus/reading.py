@@ -27,7 +27,7 @@ def read_inp(path: Path, group: str | None, key: str) -> Content:
     of the file.
 
     ``group`` is an element set of the model or of the assembly, ``Bar-1.Set-1`` (a set of an instance or of a part), an
-    instance, a part, or a set that one part alone has. Nodes and elements have the numbers of the file. Raises
+    instance, a part, or a set that exactly one part has. Nodes and elements have the numbers of the file. Raises
     MeshError with the number of the line, if one line has the error.
     """
     try:

@@ -11,14 +11,14 @@ from .elements import ElementType
 from .labels import Label, Labelled
 
 OWN = ""
-"""Key in the members of a set for the scope in which the set is defined."""
+"""Key, in the members of a set, of the scope in which the set is defined."""
 
 
 class ElementSet:
-    """Numbers of elements, or of nodes, by the key of their instance. The key ``OWN`` means the scope of the set."""
+    """Numbers of elements, or of nodes, for each instance. The key ``OWN`` is the scope of the set."""
 
     def __init__(self) -> None:
-        """Start without members."""
+        """Create an object without members."""
         self.members: dict[str, array[int]] = {}
 
     def add(self, owner: str, numbers: "array[int]") -> None:
@@ -26,8 +26,8 @@ class ElementSet:
         self.members.setdefault(owner, array("q")).extend(numbers)
 
     def include(self, other: "ElementSet", owner: str = OWN) -> None:
-        """Add the present contents of ``other``. Elements of the scope of ``other`` become elements of ``owner``
-        here.
+        """Add the present contents of ``other``. Elements of the scope of ``other`` become elements of ``owner`` in
+        this object.
         """
         for place, numbers in list(other.members.items()):
             self.add(owner if place == OWN else place, array("q", numbers))
@@ -76,7 +76,7 @@ class Scope:
     plates: dict[ElementType, Rows] = field(default_factory=dict)
     """Surface elements by type. The numbers of elements without volume are also in ``others``."""
     others: "dict[ElementType, array[int]]" = field(default_factory=dict)
-    """Numbers of the elements without volume or with an unsupported type, keyed by type."""
+    """Numbers of the elements without volume or with an unsupported type; the keys are the types."""
     sets: Labelled[ElementSet] = field(default_factory=Labelled)
     node_sets: Labelled[ElementSet] = field(default_factory=Labelled)
     node_sets_of: list[tuple[ElementSet, Label, int]] = field(default_factory=list)
@@ -86,7 +86,7 @@ class Scope:
 
     @property
     def empty(self) -> bool:
-        """Whether the scope has neither nodes nor elements."""
+        """True if the scope has neither nodes nor elements."""
         return not (self.nodes or self.solids or self.others)
 
     @property
@@ -102,7 +102,7 @@ class Scope:
     def named_set(self, name: Label, among: Labelled[ElementSet] | None = None) -> ElementSet:
         """Return the set ``name`` of ``among``, which are the sets of elements or the sets of nodes of the scope.
 
-        An empty set is made if the name is new, so a second definition of a set adds to the first.
+        If the name is new, an empty set is made. Therefore a second definition of a set adds members to the first.
         """
         sets = self.sets if among is None else among
         found = sets.get(name)
@@ -127,7 +127,7 @@ class Instance(Scope):
 
     @property
     def mesh(self) -> Scope:
-        """Scope of the nodes and elements of the instance."""
+        """Scope that contains the nodes and elements of the instance."""
         return self.part if self.empty else self
 
     def set_named(self, name: Label, of_nodes: bool = False) -> ElementSet | None:

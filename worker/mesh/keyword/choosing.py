@@ -11,14 +11,14 @@ from .deck import Deck
 from .sets import Set
 
 DEEPEST = 20
-"""Largest depth of sets that contain sets; the chosen value is above the three levels that decks have."""
+"""Largest depth of sets that contain sets. Chosen value: above the three levels that decks have."""
 _KINDS = {"part": "PART", "set_part": "PART", "set_solid": "SOLID"}
 """Words before a colon, in a name such as ``part:NAME``, that select what the name refers to."""
 
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """Arrays of a deck: numbers ``tags`` (n,) of nodes, and numbers, parts (m,) and nodes of elements."""
+    """Arrays of a deck: numbers ``tags`` (n,) of the nodes; and numbers, parts (m,) and nodes of the elements."""
 
     deck: Deck
     tags: Ids
@@ -28,7 +28,7 @@ class Content:
     """Function that returns the nodes of the given parts."""
 
     def members(self, kind: str, number: int, depth: int = 0) -> Ids:
-        """Return the ids in a set that are ids of defined nodes, parts or elements. Raises MeshError."""
+        """Return those ids in a set that are ids of defined nodes, parts or elements. Raises MeshError."""
         one = self.deck.sets.found[kind].get(number)
         if one is None or depth > DEEPEST or one.unread:
             why = "is not defined" if one is None else one.unread or "has itself among its members"
@@ -70,8 +70,8 @@ class Content:
         return np.union1d(np.array(list(self.deck.titles), np.int64), self.parts)
 
     def chosen(self, group: str, key: str) -> "np.ndarray":
-        """Return (m,) whether each element belongs to ``group``: the title or id of a part, of a set of parts or of a
-        set of solids.
+        """Return (m,) True for each element that belongs to ``group``. The group is the title or id of a part, of a set
+        of parts or of a set of solids.
         """
         meant = list(self._meant(group))
         if not meant:
@@ -120,7 +120,7 @@ class Content:
 
 def _ranged(numbers: Ids, every: Ids) -> Ids:
     """Return the ids of ``every`` that are in the ranges of the list ``numbers``. Each range begins with the count of
-    its numbers, two or three.
+    its numbers, which is two or three.
     """
     step, found = int(numbers[0]), np.zeros(len(every), bool)
     for k in range(1, len(numbers) - step + 1, step):

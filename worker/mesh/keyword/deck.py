@@ -15,7 +15,7 @@ from .sets import Sets
 _NODE = (8, 16, 16, 16, 8, 8)
 _TEN = (8,) * 10
 _EIGHT = (10,) * 8
-"""Widths of the fields of a node, of the nodes of an element, and of other cards (the manual, "*NODE",
+"""Widths of the fields of a node, of the nodes of an element, and of other cards (LS-DYNA manual, "*NODE",
 "*ELEMENT_SOLID")."""
 _OPTIONS = ("INERTIA", "CONTACT", "PRINT", "REPOSITION", "ATTACHMENT_NODES", "FIELD")
 """Options of ``*PART`` that add cards to the two cards of a part."""
@@ -35,22 +35,22 @@ class Solids:
 
 
 class Deck:
-    """The definitions of a deck and of the files that it includes."""
+    """Definitions of a deck and of the files that it includes."""
 
     def __init__(self, path: Path) -> None:
         """Read the deck. Raises MeshError with a line that cannot be read, or CardError."""
         self.nodes, self.points = array("q"), array("d")
         self.solids: dict[int, Solids] = {}
-        """Solid elements, keyed by the number of their nodes: 4, 8, 10, 20, 27."""
+        """Solid elements; the keys are the numbers of their nodes: 4, 8, 10, 20, 27."""
         self.titles: dict[int, str] = {}
-        """Titles of the parts, keyed by the ids of the parts."""
+        """Dictionary from the ids of the parts to their titles."""
         self.sets = Sets()
         self.passed, self.volumes, self.joining = Counter[str](), Counter[str](), Counter[str]()
-        """Counts, for each keyword, of element cards that are not read, and of keywords that join bodies."""
+        """Two counts for each keyword: of element cards that are not read, and of keywords that join bodies."""
         self.held = 0
         """Number of nodes that have constraints on their own card."""
         self.length = ""
-        """Unit of length that the deck gives (the manual, "*CONTROL_UNITS"); empty if the deck gives no unit."""
+        """Unit of length that the deck gives (LS-DYNA manual, "*CONTROL_UNITS"); empty if the deck gives no unit."""
         deck = cards.Deck(path)
         for block in deck.blocks():
             self._take(block)
@@ -121,7 +121,9 @@ class Deck:
         rows.lines.append(0 if block.file else card.number)
 
     def _part(self, block: Block, single: bool) -> None:
-        """Read parts; a part has two cards; with options it has further cards, and the block has one part only."""
+        """Read parts. A part has two cards. If the block has options, the part has further cards, and the block has one
+        part only.
+        """
         rows = list(block.cards)
         while rows and not rows[-1].text.strip():
             rows.pop()

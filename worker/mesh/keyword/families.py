@@ -19,11 +19,13 @@ REFUSED = (
     "NODE_TRANSFORM", "NODE_MERGE", "NODE_REFLECT", "PART_DUPLICATE", "PART_MOVE", "PART_STACKED", "ELEMENT_GENERATE",
     "ELEMENT_SOLID", "ELEMENT_BLANKING", "STRUCTURED_MESH", "ALE_STRUCTURED_MESH", "MESH", "IGA",
 )  # fmt: skip
-"""Beginnings of the keywords that make, move or join nodes and elements; these keywords are not supported."""
+"""Beginnings of the keywords that make, move or join nodes and elements. The reader does not support keywords that
+change nodes or elements."""
 VOLUMES = ("ELEMENT_TSHELL", "ELEMENT_SPH", "ELEMENT_LANCING")
 """Keywords of volume elements or particles that are not read."""
 JOINING = ("CONSTRAINED", "CONTACT", "RIGIDWALL", "RIGID", "ELEMENT_MASS", "ELEMENT_INERTIA")
-"""Beginnings of the keywords that join or hold bodies, or give them mass; these keywords have no effect on the mesh."""
+"""Beginnings of the keywords that join or hold bodies, or give them mass. Keywords that join or hold bodies have no
+effect on the mesh."""
 FAMILIES = _words(
     """
     AIRBAG ALE BATTERY BOUNDARY CASE CHEMISTRY CESE COMMENT COMPONENT CONSTRAINED CONTACT CONTROL CPM DAMPING DATABASE

@@ -17,7 +17,7 @@ from .choosing import DEEPEST, Content
 from .deck import Deck, Solids
 
 _KINDS = {4: TET4, 8: HEX8, 10: TET10, 20: Kind(Form.HEXAHEDRON, 20), 27: Kind(Form.HEXAHEDRON, 27)}
-"""Kinds of elements, keyed by the number of nodes; the first eight nodes of a hexahedron of second order are its
+"""Kinds of elements; the keys are the numbers of nodes. The first eight nodes of a hexahedron of second order are its
 corners."""
 
 
@@ -71,7 +71,9 @@ def _content(deck: Deck, tags: Ids, every: list[Cells]) -> Content:
 
 
 def _named(content: Content) -> tuple[list[Named], list[str]]:
-    """Return the sets of nodes and of segments by title and id, and remarks on the sets that cannot be read."""
+    """Return the sets of nodes and of segments, each with its title and id. Also return remarks on the sets that cannot
+    be read.
+    """
     found, remarks = list[Named](), list[str]()
     for kind in ("NODE", "SEGMENT"):
         for number, one in content.deck.sets.found[kind].items():

@@ -14,8 +14,8 @@ _GENERAL = {"NODE": ("ALL", "NODE", "DNODE", "PART", "DPART"), "PART": ("ALL", "
 """First words of the cards of a set with the option ``_GENERAL`` that are supported. A word that begins with ``D``
 removes members."""
 MOST = 20_000_000
-"""Largest count of the numbers of one range; the chosen value is more than the elements of a mesh that fits into some
-100 GB of memory."""
+"""Largest count of the numbers of one range. Chosen value: it is more than the number of elements of a mesh that fits
+into about 100 GB of memory."""
 
 
 @dataclass
@@ -32,14 +32,14 @@ class Set:
 
 
 class Sets:
-    """Sets of a deck, keyed by their kind and id."""
+    """Sets of a deck; the key of a set is its kind and id."""
 
     def __init__(self) -> None:
-        """Start with no set."""
+        """Create an object without sets."""
         self.found: dict[str, dict[int, Set]] = {kind: {} for kind in _KINDS}
 
     def take(self, block: Block) -> bool:
-        """Read a block; return whether the block belongs to a set. Raises CardError."""
+        """Read a block. Return True if the block belongs to a set. Raises CardError."""
         name, options = block.parted(_OPTIONS)
         kind = name.removeprefix("SET_")
         if not name.startswith("SET_") or kind not in _KINDS:

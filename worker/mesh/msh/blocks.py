@@ -19,7 +19,7 @@ _TYPES = {
         92: 64, 93: 125, 94: 216, 95: 343, 96: 512, 97: 729, 98: 1000, 99: 32, 106: 126, 107: 196, 108: 288, 109: 405,
         110: 550, 111: 24, 118: 30, 119: 55, 120: 91, 121: 140, 122: 204, 123: 285, 124: 385, 125: 21, 132: 1},
 }  # fmt: skip
-"""Number of nodes of each element type of gmsh, keyed by the dimension of the type (source of gmsh, GmshDefines.h)."""
+"""Number of nodes of each element type of gmsh, for each dimension of the type (source of gmsh, GmshDefines.h)."""
 _RING = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7))
 _OF_WEDGE = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5))
 _OF_PYRAMID = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4))
@@ -62,8 +62,8 @@ class Block:
 
 @dataclass(frozen=True)
 class Read:
-    """The contents of a file: ``nodes`` (n,) are the numbers of its nodes, ``points`` (n, 3) their positions; then
-    elements, and remarks on omitted contents.
+    """Contents of a file: ``nodes`` (n,) are the numbers of its nodes, ``points`` (n, 3) their positions. The other
+    fields are the elements, and remarks on omitted contents.
     """
 
     nodes: Ids

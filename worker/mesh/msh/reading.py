@@ -24,7 +24,7 @@ _LISTED = {
     "MeshFormat", "NodeData", "Nodes", "ParametricNodes", "Parametrizations", "PartitionedEntities", "Periodic",
     "PhysicalNames",
 }  # fmt: skip
-"""Sections that the format defines; sections without mesh data are skipped."""
+"""Sections that the format defines. The reader skips those without mesh data."""
 
 
 def read_msh(path: Path, group: str | None, key: str) -> Content:
@@ -56,7 +56,9 @@ def _cells(block: Block, tags: Ids) -> Cells:
 
 
 def _names(file: Sections) -> dict[tuple[int, int], str]:
-    """Return the names of the physical groups, keyed by dimension and number."""
+    """Return the names of the physical groups. A key of the result consists of the dimension and the number of the
+    group.
+    """
     count, *lines = file.parts.get("PhysicalNames", b"0").decode("utf-8", "replace").strip().splitlines()
     read = [_NAME.fullmatch(line) for line in lines]
     found = {(int(line[1]), int(line[2])): line[3] for line in read if line is not None}

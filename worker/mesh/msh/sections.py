@@ -1,7 +1,6 @@
 """Sections of a .msh file, and readers of their numbers. Layout: gmsh reference manual, "MSH file format".
 
-A section is between ``$Name`` and ``$EndName``. In a binary file the numbers have their binary form in memory; names
-are text.
+A section is between ``$Name`` and ``$EndName``. In a binary file the numbers are stored as in memory; names are text.
 """
 
 import warnings
@@ -21,12 +20,14 @@ _MARK = b"\xef\xbb\xbf"
 _SINGLE = ("MeshFormat", "PhysicalNames", "Entities", "PartitionedEntities", "Nodes", "ParametricNodes", "Elements")
 """Sections that may occur only once in a file."""
 _LARGEST = 2**53
-"""Integers up to this bound are exact as float64."""
+"""Bound of integers that are exact as float64."""
 
 
 @dataclass(frozen=True)
 class Sections:
-    """A file: its version, its sections by name, and the byte order of a binary file (empty for a text file)."""
+    """Contents of a file: its version, its sections by name, and the byte order of a binary file (empty for a text
+    file).
+    """
 
     version: str
     parts: dict[str, bytes]
@@ -104,7 +105,7 @@ class Numbers(ABC):
     """
 
     def __init__(self, name: str, content: bytes, order: str) -> None:
-        """Start to read the section ``name``. ``content``: bytes of the section; ``order``: byte order."""
+        """Create a reader of the section ``name``. ``content``: bytes of the section; ``order``: byte order."""
         self.name, self.content, self.order, self.at = name, content, order, 0
 
     def count(self) -> int:

@@ -15,7 +15,7 @@ _SURFACE = 2
 
 def named_sets(blocks: list[Block], names: Mapping[tuple[int, int], str], tags: Ids) -> Iterator[Named]:
     """Yield each physical group as a set. The set of points or curves has their nodes, the set of a surface has its
-    faces. A group without a name has its number as name.
+    faces. If a group has no name, its number is used as the name.
     """
     groups = sorted({(each.dimension, tag) for each in blocks if each.dimension < VOLUME for tag in each.groups})
     called: dict[tuple[int, str], list[int]] = {}

@@ -62,8 +62,8 @@ def _tags(numbers: Numbers, values: Floats) -> Ids:
 
 
 Rows = dict[tuple[int, ...], tuple[list[int], list[list[int]]]]
-"""Numbers and nodes of elements, keyed by element type and physical group. An element without a group has no group
-number."""
+"""Numbers and nodes of elements; the key is the element type and the physical group. An element without a group has no
+group number."""
 
 
 def _elements(numbers: Numbers) -> Rows:

@@ -1,4 +1,4 @@
-"""Nodes and elements of the .msh format 4.1. The file has one block for each geometric entity; a physical group is a
+"""Nodes and elements of the .msh format 4.1. The file has one block for each geometric entity. A physical group is a
 property of an entity.
 """
 
@@ -11,7 +11,7 @@ from .blocks import VOLUME, Block, Read, shape_of
 from .sections import Numbers, Sections
 
 Groups = dict[tuple[int, int], frozenset[int]]
-"""Physical groups, keyed by the dimension and number of a geometric entity."""
+"""Physical groups of each geometric entity; the key is the dimension and the number of the entity."""
 
 
 def read_version4(file: Sections) -> Read:

@@ -20,7 +20,7 @@ _SECTORS: dict[str, Angles] = {"full": ROUND, "half": (-0.5 * math.pi, 0.5 * mat
 
 
 def primitive(body: Revolved | RingSector, key: str) -> TetMesh:
-    """Return the mesh of a body. Raises MeshError, naming ``key``, if gmsh cannot make the mesh."""
+    """Return the mesh of a body. Raises MeshError, whose message contains ``key``, if gmsh cannot make the mesh."""
     refuse_impossible(body, key)
     low, high = bounds(body) or ((0.0,) * 3, (0.0,) * 3)
     frame = Frame(body.base, body.axis, scale_of(max(b - a for a, b in zip(low, high, strict=True))))

@@ -24,31 +24,32 @@ from .printed import captured
 from .step import length_units, solids_in, surfaces_in
 
 MOST_BYTES = 256 * 2**20
-"""Largest size of a CAD file, bytes; the chosen value is the size of an assembly of thousands of parts. OpenCASCADE
-needs some ten times as much memory."""
+"""Largest size of a CAD file, bytes. Chosen value: the size of an assembly of thousands of parts. OpenCASCADE needs
+about ten times as much memory."""
 _MILLIMETRE = Fraction(1, 1000)
 """Unit into which OpenCASCADE converts STEP files."""
 _STEP = b"ISO-10303-21;"
 _SYNTAX = b"Incorrect Syntax"
-"""Text of the OpenCASCADE error for incorrect syntax; openCASCADE continues after this error."""
+"""Text of the OpenCASCADE error for incorrect syntax. OpenCASCADE continues after an error of syntax."""
 _BREP, _BREP_END = b"CASCADE Topology V", re.compile(rb"\*\s*[+-]\d+ \d+\s*$")
 """Texts by which a BREP file is recognised: one within its first lines, and its end, which is the last shape and the
 shape that contains all others."""
 _READING = 120
-"""Time that OpenCASCADE may take to read a file, s, because the reading of a damaged file may never end. Chosen
-value."""
+"""Longest time for which OpenCASCADE may read a file, s. The reading of a damaged file may never end. Chosen value."""
 
 _SAME = 0.25
-"""Largest change of the volume of solids by a general transformation, relative. A lens of two spherical faces had 0.31
-before and 0.80 after it; chosen value: above the error of the integration over splines, 0.1 of two joined balls."""
+"""Largest relative change of the volume of solids by a general transformation. In a lens of two spherical faces the
+volume was 0.31 before and 0.80 after such a transformation. Chosen value: above the error of the integration over
+splines, which is 0.1 for two joined balls."""
 
 
 def imported(gmsh: Any, form: CadForm, path: Path, frame: Frame, head: str, *, exact: bool = False) -> Solids:
     """Return the chosen solids of a file in the frame of the model. Raises MeshError with a message that begins with
     ``head``.
 
-    ``exact``: whether spheres, cylinders and cones keep their surfaces. Without ``exact`` gmsh scales the drawn body by
-    a general transformation, which makes splines of all surfaces; the solids are read again if it changes their volume.
+    ``exact``: True if spheres, cylinders and cones keep their surfaces. If ``exact`` is False, gmsh scales the drawn
+    body by a general transformation, which converts all surfaces into splines. If the transformation changes the volume
+    of the solids, the solids are read again.
     """
     occ = gmsh.model.occ
     every, unit = _read(gmsh, form, path, head)
@@ -73,8 +74,8 @@ def _scaled(
     gmsh: Any, form: CadForm, path: Path, head: str, factor: float, every: Solids, chosen: Solids
 ) -> tuple[Solids, Solids]:  # fmt: skip
     """Replace the solids ``every`` of a file by the same solids, read again and scaled by ``factor``. Return all
-    solids, and the solids in place of ``chosen``; the order in the file identifies them, because gmsh loses the names
-    of solids that it scales.
+    solids, and the solids that replace ``chosen``. The solids are identified by their order in the file, because gmsh
+    loses the names of solids that it scales.
     """
     numbers = [every.index(each) for each in chosen]
     gmsh.model.occ.remove(every, recursive=True)
@@ -87,7 +88,7 @@ def _scaled(
 
 
 def size_of(gmsh: Any, form: CadForm, path: Path, head: str) -> float:
-    """Return the largest extent of the chosen solids of a file, m; the solids keep the position that they have in the
+    """Return the largest extent of the chosen solids of a file, m. The solids keep the position that they have in the
     file.
     """
     gmsh.model.add("size")
@@ -204,8 +205,8 @@ def _chosen(gmsh: Any, form: CadForm, solids: Solids, head: str) -> Solids:
 
 
 def _names(label: str) -> list[str]:
-    """Return the names of a solid, which are made from its label; from ``Shapes/Bullet/Core`` they are the label, every
-    end of the label, and every part of it.
+    """Return the names of a solid, which are made from its label. For the label ``Shapes/Bullet/Core`` the names are
+    the label, every end of the label, and every part of it.
     """
     steps = label.split("/")
     return [*("/".join(steps[n:]) for n in range(len(steps))), *steps[1:]]

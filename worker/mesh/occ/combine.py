@@ -19,8 +19,8 @@ AnyForm = Operand | CadForm | CombinedForm
 
 @dataclass(frozen=True)
 class Drawing:
-    """Drawing of forms into the current model of ``gmsh``, in the coordinates ``frame``; ``sources`` has the files of
-    the forms.
+    """Drawing of forms into the current model of ``gmsh``, in the coordinates ``frame``. The files of the forms are in
+    ``sources``.
 
     Several parts can be drawn into one model by several calls of ``solids``, which returns the volumes of a part. The
     function ``occ.fragment``, applied to all volumes, gives their meshes common nodes and returns a map from old to new
@@ -31,8 +31,9 @@ class Drawing:
     frame: Frame
     sources: Sources
     exact: bool = False
-    """Whether CAD bodies keep their surfaces (``cad.imported``). CAD operands of a combination always do: a body that a
-    general transformation damages would not be cut off, without an error."""
+    """True if CAD bodies keep their surfaces (``cad.imported``). CAD operands of a combination always keep their
+    surfaces. Otherwise a body that a general transformation damages would not be cut off, and no error would be
+    reported."""
 
     def solids(self, form: AnyForm, key: str) -> Solids:
         """Draw the form at the key ``key`` of the case, with its rotation. Return the volumes of the form, or no volume

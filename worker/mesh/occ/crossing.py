@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from ..model import Floats
 
 _DEEP = 1e-6
-"""Largest overlap of the projections of two triangles that only touch, divided by the extent of the surface; chosen
+"""Largest overlap of the projections of two triangles that only touch, divided by the extent of the surface. Chosen
 value: the coordinates in files have six or seven digits."""
 _MOST = 10_000_000
-"""Largest number of cell entries. The cells are enlarged until the number of entries is below this limit; the chosen
-value needs a quarter of a GiB."""
+"""Largest number of cell entries. The cells are enlarged until the number of entries is below this limit. Chosen value:
+the entries need a quarter of a GiB."""
 _CHUNK = 200_000
 """Number of pairs that are tested at once."""
 
@@ -75,7 +75,7 @@ def _near(corners: Floats, deep: float) -> Pairs:
 
 
 def _overlap(a: Floats, b: Floats, deep: float) -> NDArray[np.bool_]:
-    """Return (k,) whether the triangles (k, 3, 3) of each pair overlap by more than ``deep`` along every axis that
+    """Return (k,) True for each pair of triangles (k, 3, 3) that overlap by more than ``deep`` along every axis that
     could separate the two triangles.
     """
     sides_a, sides_b = (np.roll(t, -1, axis=1) - t for t in (a, b))
@@ -103,7 +103,7 @@ def _depth(a: Floats, b: Floats, axis: Floats) -> Floats:
 
 
 def _unit(vectors: Floats) -> Floats:
-    """Return vectors of length 1; zeros for vectors whose length is zero within round-off."""
+    """Return vectors of length 1. If the length of a vector is zero within round-off, the result is a zero vector."""
     length = np.sqrt((vectors**2).sum(axis=1, keepdims=True))
     tiny = length <= 1e-12 * max(float(length.max(initial=0.0)), 1e-300)
     unit: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=~tiny)

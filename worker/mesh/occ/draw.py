@@ -25,7 +25,7 @@ from conoid.cases.shapes.profile import Arc, Profile, Segment, profile
 from .frame import Frame, Vector
 
 Solids = list[tuple[int, int]]
-"""Entities of gmsh; each is given by its dimension and its number."""
+"""Entities of gmsh. Each entity is given by its dimension and its number."""
 Angles = tuple[float, float]
 Form = (
     BoxForm | PlateForm | CylinderForm | TubeForm | SphereForm | ConeForm | OgiveForm | BallPiece
@@ -110,7 +110,7 @@ def _ring(occ: Any, form: RingSectorForm, scale: float, begin: float, end: float
 
 
 def _revolved(occ: Any, outline: Profile, scale: float, begin: float, end: float) -> Solids:
-    """Draw the solid that the area between the outline and the axis sweeps in a rotation about the axis."""
+    """Draw the solid that results from a rotation about the axis of the area between the outline and the axis."""
     segments = outline.segments
     low, high = (radius / scale for radius in outline.ends)
     start = occ.addPoint(0, 0, 0)
@@ -138,8 +138,8 @@ def _side(occ: Any, each: Segment, first: int, last: int, scale: float) -> int:
 
 
 def _in_thirds(occ: Any, sides: list[int]) -> Solids:
-    """Draw a body of revolution with a surface of three faces that have a common tip. If a slender tip has one face
-    only, gmsh makes two triangles with the same three nodes.
+    """Draw a body of revolution with a surface of three faces that have a common tip. Three faces are needed: if a
+    slender tip has only one face, gmsh makes two triangles with the same three nodes.
     """
     third = _swept(occ, sides, 0.0, ROUND[1] / 3.0)
     others = [occ.copy(third) for _ in range(2)]
@@ -150,7 +150,9 @@ def _in_thirds(occ: Any, sides: list[int]) -> Solids:
 
 
 def _swept(occ: Any, sides: list[int], begin: float, end: float) -> Solids:
-    """Return the volume that the area within ``sides`` sweeps between two angles, rad; the drawn area is removed."""
+    """Return the volume that results from a rotation of the area within ``sides`` between two angles, rad. The drawn
+    area is removed.
+    """
     area = occ.addPlaneSurface([occ.addCurveLoop(sides)])
     if begin:
         occ.rotate([(2, area)], 0, 0, 0, 0, 0, 1, begin)

@@ -16,8 +16,8 @@ from .shells import Surface, nested
 from .stl import read_stl
 
 _MOST = 1500
-"""Largest number of facets; chosen value: OpenCASCADE takes 10 s to intersect a ball of 1,500 facets with a box; the
-time is proportional to the square of the number of facets."""
+"""Largest number of facets. Chosen value: OpenCASCADE takes 10 s to intersect a ball of 1,500 facets with a box, and
+the time is proportional to the square of the number of facets."""
 
 
 def faceted(gmsh: Any, form: StlForm, path: Path, frame: Frame, head: str) -> Solids:

@@ -12,8 +12,8 @@ from .draw import Solids
 from .frame import Frame
 
 _SHORT = 0.5
-"""Length of an edge, divided by the element size, below which the edge is reported; chosen value: a tet at an edge of
-this length has half the time step."""
+"""Length of an edge, divided by the element size. Shorter edges are reported. Chosen value: a tet at an edge of this
+length has half the time step."""
 
 
 def small_features(gmsh: Any, element_size: float, frame: Frame, solids: Solids) -> Iterator[str]:

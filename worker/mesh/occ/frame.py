@@ -1,7 +1,7 @@
 """Coordinates in which a model is drawn. The origin is the point where sectors are cut, and the third direction is
 along an axis.
 
-Lengths in these coordinates are of order one, because the tolerances of gmsh and OpenCASCADE are absolute.
+Lengths in the coordinates of the model are of order one, because the tolerances of gmsh and OpenCASCADE are absolute.
 """
 
 import math
@@ -19,8 +19,8 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Frame:
-    """Coordinates (a, b, c) in which a model is drawn: the directions of ``across(axis)`` and ``axis`` in cyclic order.
-    The origin is ``origin``, m; the unit of length is ``scale``, m.
+    """Coordinates (a, b, c) in which a model is drawn. The coordinates have the directions of ``across(axis)`` and
+    ``axis`` in cyclic order. The origin is ``origin``, m; the unit of length is ``scale``, m.
     """
 
     origin: Vector
@@ -46,8 +46,8 @@ class Frame:
         return self.directions.index(AXES.index(axis))
 
     def to_space(self, points: Floats) -> Floats:
-        """Return points (n, 3) of the frame in x, y, z, m. A coordinate of zero becomes exactly the coordinate of the
-        origin.
+        """Return points (n, 3) of the frame in coordinates x, y, z, m. A coordinate of zero becomes exactly the
+        coordinate of the origin.
         """
         turned = np.empty_like(points)
         turned[:, self.directions] = points * self.scale
@@ -56,5 +56,5 @@ class Frame:
 
 
 def scale_of(extent: float) -> float:
-    """Return a power of two near a length, m; a division by this power is exact."""
+    """Return a power of two near a length, m. A division by a power of two is exact."""
     return 2.0 ** round(math.log2(extent))

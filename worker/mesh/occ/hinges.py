@@ -1,5 +1,5 @@
-"""Solids of one body that touch in edges or points only; these solids have common nodes there, and such a joint carries
-no moment.
+"""Solids of one body that touch in edges or points only. Such solids have common nodes in these edges or points, and
+the joint carries no moment.
 """
 
 from collections.abc import Iterator

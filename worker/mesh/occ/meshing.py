@@ -1,4 +1,4 @@
-"""Meshing of a drawn model whose element sizes are set; first gmsh makes the tets. Then nodes are moved to increase the
+"""Meshing of a drawn model whose element sizes are set. First gmsh makes the tets. Then nodes are moved to increase the
 smallest step lengths.
 """
 
@@ -15,19 +15,19 @@ from .frame import Frame
 from .sliding import Cut, Sliding
 
 WANTED = 0.75
-"""Step length, divided by the step length of a regular tet with edge ``element_size``; smaller step lengths are raised
-where possible."""
+"""Step length of a tet, divided by the step length of a regular tet with the edge ``element_size``. Smaller step
+lengths are increased where possible."""
 _CHORD = 0.25
 """Largest mean distance of flat faces from a round surface, divided by the element size. Faces with edges e are on
 average e^2 / (8 r) from a sphere of radius r, which is e / 8 for e = r."""
 _OTHERS = ({"Mesh.Algorithm3D": 1}, {"Mesh.Algorithm3D": 1, "Mesh.Algorithm": 1})
-"""Further attempts after a failure of gmsh: first the Delaunay mesher in place of HXT, then the Delaunay mesher with
+"""Further meshers that are used if gmsh fails: first the Delaunay mesher in place of HXT, then the Delaunay mesher with
 triangles by MeshAdapt."""
 
 
 def meshed(gmsh: Any, frame: Frame, element_size: float, cuts: Sequence[Cut]) -> TetMesh:
-    """Return the tets of the current model, with points in space, m. The model is cut on the planes ``cuts`` of the
-    frame.
+    """Return the tets of the current model, with points in space, m. ``cuts``: planes of the frame on which the model
+    is cut.
     """
     return with_names(gmsh, frame, element_size, cuts)[0]
 
@@ -69,15 +69,16 @@ def _generate(gmsh: Any) -> None:
 
 def _off(gmsh: Any) -> str:
     """Return a message if the volume of the tets differs from the volume of the model by more than flat faces can
-    explain; else "".
+    explain; else return an empty text.
 
-    The test is needed because gmsh meshes some closed surfaces inside out or only in part, without an error.
+    The test of the volume is needed because gmsh meshes some closed surfaces inside out or only in part, without an
+    error.
     """
     occ, volumes, filled = gmsh.model.occ, gmsh.model.getEntities(3), 0.0
     try:
         whole = sum(occ.getMass(*each) for each in volumes)
         skin = sum(occ.getMass(*each) for each in gmsh.model.getBoundary(volumes, oriented=False))
-    except Exception:  # a volume within triangles: OpenCASCADE has no surface for it
+    except Exception:  # a volume bounded by triangles: OpenCASCADE has no surface for it
         return ""
     for volume in volumes:
         for tags in gmsh.model.mesh.getElements(*volume)[1]:

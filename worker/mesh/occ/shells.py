@@ -15,14 +15,14 @@ Triangles = NDArray[np.int64]
 _LOOKED_AT = 64
 """Number of facets of a shell whose position relative to other shells is tested. Chosen value."""
 _IN = 1e-6
-"""Depth at which a tested point is inside of its own shell, divided by the extent of the surface."""
+"""Depth, divided by the extent of the surface, at which a tested point lies inside of its own shell."""
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles of a surface.
+    """Surface that consists of triangles.
 
-    ``points`` (n, 3) in units of the file, ``faces`` (k, 3) nodes of the triangles, ``shell`` (n,) the number of the
+    ``points`` (n, 3) in units of the file; ``faces`` (k, 3) nodes of the triangles; ``shell`` (n,) the number of the
     closed surface of each point.
     """
 
@@ -103,8 +103,8 @@ def _winds(corners: Floats, point: Floats) -> bool:
 
 
 def _winding(corners: Floats, point: Floats) -> float:
-    """Return the winding number of a closed surface about a point: its solid angle (van Oosterom and Strackee 1983,
-    IEEE Trans. Biomed. Eng. 30, 125) divided by 4 pi.
+    """Return the winding number of a closed surface about a point: the solid angle of the surface (van Oosterom and
+    Strackee 1983, IEEE Trans. Biomed. Eng. 30, 125) divided by 4 pi.
     """
     a, b, c = (corners - point).transpose(1, 0, 2)
     p, q, r = (np.sqrt((x * x).sum(axis=1)) for x in (a, b, c))

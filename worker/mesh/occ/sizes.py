@@ -10,20 +10,21 @@ from .frame import Frame
 from .sliding import Cut
 
 GMSH_SIZE = 0.87
-"""Size given to gmsh, divided by ``element_size``; in a cube of this size HXT makes 4 tets; with this factor it makes 6
-tets in element_size^3, as the structured generator does, and the mean edge is 1.15 element_size."""
+"""Size given to gmsh, divided by ``element_size``. In a cube with an edge of the given size HXT makes 4 tets. With this
+factor HXT makes 6 tets in a cube with the edge element_size, as the structured generator does, and the mean edge is
+1.15 element_size."""
 _FINEST = 400
-"""Largest number of points of a face, in each direction, from which distances are measured; with the chosen value gmsh
-needs a second for the 160,000 points of a face."""
+"""Largest number of points of a face, in each direction, from which distances are measured. Chosen value: gmsh needs a
+second for the 160,000 points of a face."""
 _FLAT = 1e-6
-"""Largest thickness, in units of the model, of a face that counts as lying on a cut plane of a sector; the value is
+"""Largest thickness of a face that counts as lying on a cut plane of a sector, in units of the model. The thickness is
 above the tolerance of OpenCASCADE, 1e-7."""
 
 
 def set_size(
     gmsh: Any, element_size: float, grading: Grading | None, frame: Frame, cuts: Sequence[Cut] = ()
 ) -> None:  # fmt: skip
-    """Set the element size of the whole model. The model is cut on the planes ``cuts`` of the frame."""
+    """Set the element size of the whole model. ``cuts``: planes of the frame on which the model is cut."""
     sizes = [element_size] if grading is None else [element_size, grading.far_size]
     if grading is not None:
         volumes = [tag for _, tag in gmsh.model.getEntities(3)]
@@ -71,8 +72,8 @@ def _depth(gmsh: Any, fine: float, volumes: Sequence[int], cuts: Sequence[Cut]) 
     """Return the number of a gmsh field: the distance from the surface of ``volumes``, measured from points on the
     faces.
 
-    The distance between points is half of ``fine``, so that the distance computed for a node on the surface is below
-    ``fine``.
+    The distance between two points is half of ``fine``. Therefore the distance computed for a node on the surface is
+    below ``fine``.
     """
     field, model = gmsh.model.mesh.field, gmsh.model
     faces = [abs(tag) for _, tag in model.getBoundary([(3, tag) for tag in volumes], combined=True, oriented=False)]
@@ -86,6 +87,6 @@ def _depth(gmsh: Any, fine: float, volumes: Sequence[int], cuts: Sequence[Cut]) 
 
 
 def _lies_on(box: Sequence[float], cut: Cut) -> bool:
-    """Return whether a face lies on a plane of the frame; ``box``: lowest and highest corner of the face."""
+    """Return True if a face lies on a plane of the frame; ``box``: lowest and highest corner of the face."""
     d, at = cut
     return max(abs(box[d] - at), abs(box[3 + d] - at)) < _FLAT

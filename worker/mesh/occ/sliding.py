@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ..model import Floats, Ids
 
 NEAR = 1e-9
-"""Largest distance between a node and a cut plane, in units of the model, at which the node counts as lying on the
-plane."""
+"""Largest distance between a node and a cut plane at which the node counts as lying on the plane, in units of the
+model."""
 
 Cut = tuple[int, float]
 """A plane on which a body is cut: index of its normal direction, and its position."""
@@ -25,8 +25,8 @@ Nearest = Callable[[Floats], Floats]
 class Sliding:
     """Constraints on the nodes of a body.
 
-    ``entity``: (n,) index in ``nearest`` of the face or edge of each node, -1 inside of the body, -2 at a corner.
-    ``held``: (n, 3) whether each coordinate of a node is fixed by a cut plane.
+    ``entity`` (n,): index in ``nearest`` of the face or edge of each node, -1 inside of the body, -2 at a corner.
+    ``held`` (n, 3): True for each coordinate of a node that a cut plane fixes.
     """
 
     entity: NDArray[np.int32]
@@ -35,8 +35,8 @@ class Sliding:
 
     @classmethod
     def of(cls, gmsh: Any, tags: Ids, points: Floats, cuts: Sequence[Cut]) -> tuple[Self, Floats]:
-        """Return the constraints on the nodes ``tags`` of the current model, and the ``points`` of the nodes, projected
-        onto the planes of ``cuts``.
+        """Return the constraints on the nodes ``tags`` of the current model. Also return the ``points`` of the nodes,
+        projected onto the planes of ``cuts``.
         """
         entity, nearest = np.full(len(tags), -1, np.int32), list[Nearest]()
         for dimension, number in gmsh.model.getEntities():
@@ -54,7 +54,7 @@ class Sliding:
         return cls(entity, tuple(nearest), held), points
 
     def movable(self, node: int) -> bool:
-        """Return whether ``node`` can move."""
+        """Return True if ``node`` can move."""
         return bool(self.entity[node] != -2)
 
     def allowed(self, node: int, start: Floats, places: Floats) -> Floats:
@@ -75,8 +75,8 @@ def _nearest(gmsh: Any, dimension: int, number: int) -> Nearest:
 
 
 def _flat(gmsh: Any, number: int) -> Nearest:
-    """Return a point of a plane face (the middle of its parameters) and the normal of the face. For a curved face gmsh
-    searches the nearest point.
+    """Return the callback for a plane face, which projects points onto the plane of the face. (For a curved face gmsh
+    searches the nearest point.)
     """
     low, high = gmsh.model.getParametrizationBounds(2, number)
     middle = 0.5 * (np.asarray(low) + np.asarray(high))

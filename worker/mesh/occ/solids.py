@@ -28,9 +28,9 @@ from .surface import enclose
 
 T = TypeVar("T")
 _BY_GMSH = "gmsh"
-"""Beginning of messages about the mesher; messages about a file begin with the key of the mesh."""
+"""Beginning of messages about the mesher. Messages about a file begin with the key of the mesh."""
 _TETS_PER_CUBE = 6.0
-"""Number of tets that gmsh makes in a volume of element_size^3."""
+"""Number of tets that gmsh makes in a cube with the edge element_size."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,9 @@ class _Made:
 
 
 def measured(mesh: Measured, sources: Sources, key: str) -> TetMesh:
-    """Return the mesh of a body whose size is computed from its geometry. Raises MeshError, naming ``key``."""
+    """Return the mesh of a body whose size is computed from its geometry. Raises MeshError, whose message contains
+    ``key``.
+    """
     if isinstance(mesh, Stl):
         made = _of_surface(mesh, sources, key)
     elif isinstance(mesh, Cad | Combination):
@@ -53,8 +55,8 @@ def measured(mesh: Measured, sources: Sources, key: str) -> TetMesh:
 
 
 def with_surfaces(make: Callable[[bool], T], bodies: Iterable[object]) -> T:
-    """Return ``make(False)``; if gmsh cannot mesh the splines that it has made of the surfaces of a CAD body among the
-    ``bodies``, return ``make(True)``, which keeps these surfaces.
+    """Return ``make(False)``. gmsh may fail to mesh the splines that it has made from the surfaces of a CAD body among
+    the ``bodies``. If gmsh fails, return ``make(True)``, which keeps these surfaces.
     """
     try:
         return make(False)

@@ -52,7 +52,7 @@ def solids_in(data: bytes) -> int:
 
 
 def surfaces_in(data: bytes) -> int:
-    """Return the number of surface bodies that the file defines; a surface body has no volume."""
+    """Return the number of surface bodies that the file defines. A surface body has no volume."""
     return len(_OPEN.findall(_TEXT.sub(b"''", data)))
 
 
@@ -62,7 +62,7 @@ def _entity(text: bytes, name: bytes) -> bytes:
 
 
 def _length(text: bytes, name: bytes, depth: int) -> Fraction | None:
-    """Return the unit of an entity, m; None if the unit is no unit of length. An inch is defined by means of another
+    """Return the unit of an entity, m; None if the unit is not a unit of length. An inch is defined by means of another
     unit, which is read first.
     """
     entity = _entity(text, name)

@@ -13,7 +13,7 @@ from .crossing import crossing
 from .shells import Surface, Triangles, astray, shells
 
 MOST_FACETS = 1_000_000
-"""Largest number of facets; with the chosen value the search for crossing facets takes a minute."""
+"""Largest number of facets. Chosen value: the search for crossing facets takes a minute."""
 _HEAD, _FACET = 84, 50
 """Number of bytes of a binary STL file before its facets, and number of bytes of each facet."""
 
@@ -50,10 +50,10 @@ def read_stl(path: Path, head: str) -> Surface:
 
 
 def _is_binary(data: bytes) -> bool:
-    """Return whether a STL file is binary.
+    """Return True if an STL file is binary.
 
-    The test uses the size of the file, or bytes that no text has; the first word is not sufficient, because the head of
-    a binary file may also begin with ``solid``.
+    The test uses the size of the file, or bytes that no text has. The first word of the file is not sufficient for the
+    test, because the head of a binary file may also begin with ``solid``.
     """
     if len(data) < _HEAD:
         return False

@@ -1,5 +1,5 @@
-"""Conversion of a closed surface of triangles into a gmsh model, which has faces between the sharp edges of the
-surface, and the volumes inside.
+"""Conversion of a closed surface of triangles into a gmsh model. The model has faces between the sharp edges of the
+surface, and the volumes inside of it.
 """
 
 import math
@@ -14,7 +14,7 @@ _TRIANGLE = 2
 
 
 def enclose(gmsh: Any, surface: Surface, factor: float, edge_angle: float) -> None:
-    """Add a surface to the current model; its lengths are multiplied by ``factor``.
+    """Add a surface to the current model. Its lengths are multiplied by ``factor``.
 
     The surface is cut at edges sharper than ``edge_angle``, rad, into smooth faces that gmsh can parametrise. The model
     gets one volume inside of each outer shell.

@@ -18,17 +18,18 @@ def _words(text: str) -> frozenset[str]:
 SOLIDS = {"BRICK": 8, "TETRA4": 4, "TETRA10": 10, "PENTA6": 6, "BRIC20": 20}
 """Volume elements that are read, with the number of their nodes (Reference Guide, "Elements")."""
 NODES_A_LINE = {"TETRA10": 10, "BRIC20": 8}
-"""Number of nodes in one line, for elements that take several lines. The nodes of a tet are in the line after the
-number of the tet."""
+"""Number of nodes in one line, for elements that take several lines. The nodes of a tet are in the line that follows
+the number of the tet."""
 VOLUMES = ("SHEL16", "SPHCEL", "QUAD", "TRIA")
 """Keywords of volume elements or particles that are not read."""
 PLATES = ("SHELL", "SH3N", "BEAM", "TRUSS", "SPRING", "XELEM", "RIVET")
 """Keywords of elements without volume."""
 REFUSED = ("TRANSFORM", "CNODE", "MERGE", "SUBMODEL", "ADMESH", "MADYMO", "XREF", "REFSTA", "EREF", "INISTA")
-"""Keywords that make, move or join nodes and elements, or read their state from a file; these keywords are not
-supported."""
+"""Keywords that make, move or join nodes and elements, or read their state from a file. The reader does not support
+keywords that change nodes or elements."""
 JOINING = ("INTER", "RBODY", "RBE2", "RBE3", "RWALL", "RLINK", "MPC", "GJOINT", "CYL_JOINT", "BCS", "ADMAS", "LAG_MUL")
-"""Keywords that join or hold bodies, or give them mass; these keywords have no effect on the mesh."""
+"""Keywords that join or hold bodies, or give them mass. Keywords that join or hold bodies have no effect on the
+mesh."""
 GROUPS = ("GRNOD", "SURF")
 """First words of the keywords of groups of nodes and of surfaces."""
 FAMILIES = _words(
@@ -57,7 +58,9 @@ class Solids:
 
 @dataclass
 class Group:
-    """A group of nodes or a surface as the deck defines it: ``kind`` (``GRNOD/NODE``) and the numbers in its lines."""
+    """Group of nodes or surface, as the deck defines it: ``kind`` (for example ``GRNOD/NODE``) and the numbers in its
+    lines.
+    """
 
     kind: str
     title: str
@@ -65,22 +68,22 @@ class Group:
 
 
 class Deck:
-    """The contents of a deck."""
+    """Contents of a deck."""
 
     def __init__(self, path: Path) -> None:
         """Read the deck. Raises MeshError with a line that cannot be read."""
         self.nodes, self.points = array("q"), array("d")
         self.solids: dict[str, Solids] = {}
         self.titles: dict[int, str] = {}
-        """Titles of the parts, keyed by the numbers of the parts."""
+        """Dictionary from the numbers of the parts to their titles."""
         self.subset_of: dict[int, int] = {}
         """Number of the subset of each part."""
         self.subsets: dict[int, tuple[str, list[int]]] = {}
-        """Title of each subset, and the numbers of the subsets inside of it."""
+        """Title of each subset, and the numbers of the subsets that it contains."""
         self.groups: dict[tuple[str, int], Group] = {}
-        """Groups of a deck, keyed by the first word and the number."""
+        """Groups of a deck; the key of a group is its first word and its number."""
         self.passed, self.volumes, self.joining = Counter[str](), Counter[str](), Counter[str]()
-        """Counts, for each first word, of lines of elements that are not read, and of keywords that join bodies."""
+        """Two counts for each first word: of lines of elements that are not read, and of keywords that join bodies."""
         self.included = Included(path)
         """Paths of the deck and of the files that it includes."""
         self.length = ""

@@ -1,9 +1,9 @@
-"""Text of a Radioss starter deck. The text consists of blocks; a block is a keyword line that begins with ``/`` and the
-lines after it.
+"""Text of a Radioss starter deck. The text consists of blocks. A block is a keyword line, which begins with ``/``, and
+the lines after it.
 
 Rules of the Altair Radioss Reference Guide, "Starter input": a line that begins with ``/`` is a keyword, and the words
 of the keyword are divided by ``/``. A line that begins with ``#`` or ``$`` is a comment. Fields are 10 columns wide for
-integers and 20 columns for other values.
+integers and 20 columns wide for other values.
 """
 
 from collections.abc import Iterator
@@ -15,14 +15,16 @@ from conoid.cases.reading.problems import shown
 from ...errors import MeshError
 
 NUMBER, REAL = 10, 20
-"""Width of the field of an integer and of a floating point number, in columns."""
+"""Width of the field of an integer, and width of the field of a floating point number, in columns."""
 _LARGEST = 2**53
 """Upper bound of integers in a deck."""
 
 
 @dataclass
 class Block:
-    """A keyword: its words in upper case, the number of its line, and the following lines with their numbers."""
+    """Block of a deck: the words of its keyword in upper case, the number of the keyword's line, and the following
+    lines with their numbers.
+    """
 
     words: list[str]
     line: int
@@ -30,13 +32,13 @@ class Block:
 
     @property
     def kind(self) -> str:
-        """Words before the first number, such as ``GRNOD/NODE``."""
+        """Words of the keyword before the first number, such as ``GRNOD/NODE``."""
         names = [word for word in self.words if not word.isdecimal()]
         return "/".join(names)
 
     @property
     def id(self) -> int:
-        """First number among the words. Raises MeshError if no word of the keyword is a number."""
+        """First number among the words of the keyword. Raises MeshError if no word of the keyword is a number."""
         found = next((word for word in self.words if word.isdecimal()), None)
         if found is None or not 0 < int(found) < _LARGEST:
             raise MeshError(f"line {self.line}: /{'/'.join(self.words)} has no number")

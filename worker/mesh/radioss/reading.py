@@ -16,8 +16,8 @@ from .deck import KNOWN, Deck, Group
 
 _KINDS = {"BRICK": HEX8, "TETRA4": TET4, "TETRA10": TET10, "PENTA6": WEDGE6, "BRIC20": Kind(Form.HEXAHEDRON, 20)}
 _DEEPEST = 20
-"""Largest depth of groups within groups, and of subsets within subsets; the chosen value is above the five levels that
-decks have."""
+"""Largest depth of groups within groups, and of subsets within subsets. Chosen value: above the five levels that decks
+have."""
 
 
 def read_radioss(path: Path, group: str | None, key: str) -> Content:
@@ -56,7 +56,7 @@ class _Reader:
         self.cells = [self._cells(word) for word in deck.solids]
         self.of = [np.array(rows.parts, np.int64) for rows in deck.solids.values()]
         self.lost = dict[str, Ids]()
-        """Undefined nodes in groups of nodes, keyed by group."""
+        """Undefined nodes in groups of nodes; the keys are the groups."""
 
     def _cells(self, word: str) -> Cells:
         rows = self.deck.solids[word]

@@ -1,7 +1,7 @@
 """Arrays of a .vtu file. An array is text, base64 or bytes, and may be compressed.
 
 Layout: VTK user's guide, "XML file formats". The data of an array is in its XML element, or in ``AppendedData`` after
-the character ``_``. Before the data is a count of bytes, or a table of compressed blocks.
+the character ``_``. The data begins with a count of bytes, or with a table of compressed blocks.
 """
 
 import base64
@@ -28,7 +28,7 @@ _START, _END = b"<AppendedData", b"</AppendedData>"
 
 
 class Grid:
-    """Contents of the one piece of an unstructured grid."""
+    """Contents of a .vtu file, which must have one piece of an unstructured grid."""
 
     def __init__(self, path: Path) -> None:
         """Read the file. Raises MeshError if the file is no .vtu file, is damaged, or has several pieces."""
@@ -169,5 +169,5 @@ def _coded(size: int) -> int:
 
 
 def _bytes(data: bytes, size: int, coded: bool) -> bytes:
-    """Return the first ``size`` bytes of data, decoded from base64 if ``coded``."""
+    """Return the first ``size`` bytes of data. If ``coded``, the data is decoded from base64."""
     return base64.b64decode(data[: _coded(size)], validate=True)[:size] if coded else data[:size]

@@ -1,6 +1,6 @@
 """Selection of elements from a .vtu file: all volume elements, or the elements with a given value in an array of cells.
 
-Conoid has a reader of its own: the reader of VTK only prints an error for a damaged file and continues with partial
+Conoid has its own reader. The reader of VTK only prints an error for a damaged file and continues with partial
 contents, and meshio ends if an array is unknown.
 """
 
@@ -23,7 +23,7 @@ _KINDS = {
 }  # fmt: skip
 """Numbers of the VTK volume types that are read (vtkCellType.h), and their kinds."""
 _FACES = {5: 3, 9: 4, 22: 3, 23: 4, 28: 4, 8: 4}
-"""Numbers of the VTK surface types, with the number of their corners."""
+"""Numbers of the VTK surface types, and the number of corners of each type."""
 _EMPTY = frozenset((0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36))
 """Numbers of the VTK types without volume."""
 _VOXEL, _PIXEL = 11, 8
@@ -31,15 +31,15 @@ _VOXEL, _PIXEL = 11, 8
 _ORDER = {_VOXEL: [0, 1, 3, 2, 4, 5, 7, 6], _PIXEL: [0, 1, 3, 2]}
 _MIRRORED = {6: [0, 2, 1, 3, 5, 4], 15: [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]}
 """Order of the nodes of a wedge. In the documentation of VTK the first triangle of a wedge faces outwards, but most
-programs write it facing inwards."""
+programs write wedges whose first triangle faces inwards."""
 
 
 def read_vtu(path: Path, group: str | None, key: str) -> Content:
     """Return the volume elements of ``group``, or all volume elements of a .vtu file; also return the sets of the file.
 
     ``group`` is ``array:value``, or only a value if exactly one array of cells has integers. An integer array of points
-    is a set of the nodes with a value other than 0. Each value of an array of cells is a surface. In messages nodes and
-    elements are numbered from 0. Raises MeshError.
+    is a set of nodes; the set contains the nodes whose value is not 0. Each value of an array of cells is a surface. In
+    messages nodes and elements are numbered from 0. Raises MeshError.
     """
     grid = Grid(path)
     n, m = grid.points_count, grid.cells_count
