@@ -4,11 +4,12 @@ import { call } from "./api.js";
 import { count, counted, h, si } from "./figures.js";
 import { act } from "./keys.js";
 import { three } from "./libraries.js";
+import { Moment } from "./moment.js";
 import { Picked, table } from "./picked.js";
 import { SectionPlane, symmetry } from "./plane.js";
 import { range } from "./ranges.js";
 import { film, picture } from "./saving.js";
-import { colourings, fragment, rowOf, telling } from "./snapshot.js";
+import { colourings, fragment, partsOf, rowOf, telling } from "./snapshot.js";
 import { Snapshots } from "./snapshots.js";
 import { Tools } from "./tools.js";
 import { View3d } from "./view3d.js";
@@ -31,7 +32,7 @@ export class Body {
   build() {
     this.holder = h("div.holder3d");
     this.tools = new Tools({
-      colour: () => this.paint(), section: () => this.choose(), slice: () => this.slice(), camera: (name) => this.view.eye.view(name),
+      colour: () => this.paint(), section: () => this.choose(), slice: () => this.slice(), camera: (name) => this.look(name),
       follow: (text) => this.follow(text), set: (name, value) => this.set(name, value), opacities: () => this.view.set({ opacities: this.tools.opacities }),
       save: (kind) => this.save(kind), fragments: () => this.list(),
     });
@@ -40,8 +41,8 @@ export class Body {
     this.scrub = h("input", { type: "range", min: 0, step: 1, max: 0, value: 0, "aria-label": "snapshot" });
     this.playing = h("button.quiet", { type: "button" }, "Play");
     this.note = h("span.note");
-    this.moment = h("output");
-    this.bar = h("div.scrub", {}, this.playing, this.scrub, this.moment);
+    this.moment = new Moment(() => this.entries.map(({ t }) => t), (place) => this.go(place));
+    this.bar = h("div.scrub", {}, this.playing, this.scrub, this.moment.element);
     this.element = h("section.card.body3d", { "aria-label": "the body", hidden: "" },
       h("div.card-head", {}, h("h2", {}, "The body"), this.note), this.tools.element, h("div.frame3d", {}, this.holder, h("div.aside3d", {}, this.tools.cutting)), this.bar);
     this.listen();
@@ -92,7 +93,7 @@ export class Body {
   // If the slider moves faster than the network, only the last requested snapshot is fetched.
   async show(place) {
     this.scrub.value = place;
-    this.moment.textContent = si(this.entries[place].t, "s");
+    this.moment.show(this.entries[place].t);
     this.wanted = place;
     if (this.fetching) return this.fetching;
     this.fetching = this.fetch();
@@ -164,6 +165,12 @@ export class Body {
     this.tell();
   }
 
+  // After a view across the section, the side of the plane towards the camera is cut away.
+  look(name) {
+    this.view.eye.view(name);
+    if (this.plane.face(this.view.eye)) this.slice();
+  }
+
   slice() {
     this.view.slice(this.plane.value);
     this.tell();
@@ -190,9 +197,10 @@ export class Body {
     this.set(name, this.tools[name].checked);
   }
 
-  step(by) {
+  step(by) { this.go(Math.min(Math.max(Number(this.scrub.value) + by, 0), this.entries.length - 1)); }
+
+  go(place) {
     this.pause();
-    const place = Math.min(Math.max(Number(this.scrub.value) + by, 0), this.entries.length - 1);
     this.following = place === this.entries.length - 1;
     this.show(place);
   }
@@ -203,7 +211,7 @@ export class Body {
   pick(row, kept = false) {
     const found = row >= 0 ? fragment(this.snapshot, row) : null;
     this.view.mark(row);
-    this.card.show(found, this.snapshot.header.t);
+    this.card.show(found, this.snapshot.header.t, found && partsOf(this.snapshot)[row]);
     if (found || !kept) this.picked = found ? found.id : null;
     this.list();
   }

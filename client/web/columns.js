@@ -37,6 +37,8 @@ const IF_ANY = new Set(["references", "labels"]); // Columns that are shown only
 const unsure = ({ state }) => state !== "succeeded";
 const TELLING = /^(fragments|reference\.penetration.*)$/; // Results whose columns are shown by default.
 const MOST_PROBES = 4; // Largest number of probes whose columns are shown by default.
+const HASH = /\.sha256$/; // Keys whose value is a hash, of which a column shows the first DIGITS digits.
+const DIGITS = 8;
 const MOST_VALUES = 6; // Largest number of keys of the case whose columns are shown by default.
 
 function labels(row) {
@@ -89,7 +91,10 @@ const titled = (name) => name.replace(/worst_residual/, "worst energy residual")
 function numeric(rows, column) {
   const { unit, value } = column;
   const values = rows.map(value).filter((one) => one !== null);
-  if (values.some((one) => typeof one !== "number")) return { ...column, unit: "", text: (row) => String(value(row) ?? "") };
+  if (values.some((one) => typeof one !== "number")) {
+    const most = HASH.test(column.full) ? DIGITS : Infinity;
+    return { ...column, unit: "", text: (row) => String(value(row) ?? "").slice(0, most) };
+  }
   const sizes = values.filter((one) => Number.isFinite(one) && one !== 0).map(Math.abs).sort((a, b) => a - b);
   const { worth, unit: name } = scaleOf(sizes[Math.floor(sizes.length / 2)] ?? 0, unit);
   const measured = (one) => (!unit && Number.isInteger(one) ? count(one) : si(one / worth, "", 4));

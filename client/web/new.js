@@ -50,7 +50,10 @@ export class NewPage {
   }
 
   build() {
-    this.editor = new Editor("the case", () => this.typed());
+    this.editor = new Editor("the case", () => {
+      this.asked = false;
+      this.typed();
+    });
     this.gallery = h("select", { "aria-label": "start from a shipped case", onchange: () => this.take(this.gallery.value) }, h("option", { value: "" }, "a shipped case …"));
     const chosen = h("input", { type: "file", multiple: "", "aria-label": "choose a case and its files", onchange: () => this.drop([...chosen.files]) });
     this.fields = FIELDS.map(([id, words, table, name]) => {
@@ -126,10 +129,17 @@ export class NewPage {
   }
 
   pressed(event) {
-    if (event.key === "Enter" && (event.ctrlKey || event.metaKey) && !this.startButton.disabled) {
-      event.preventDefault();
-      this.start();
-    }
+    if (event.key !== "Enter" || !(event.ctrlKey || event.metaKey) || this.starting) return;
+    event.preventDefault();
+    this.asked = true;
+    this.draw();
+  }
+
+  // Starts the run if the user has asked for the start; during a check, the start waits for the end of the check.
+  startIfAsked(current) {
+    if (!this.asked || (!current && this.editor.text.trim())) return;
+    this.asked = false;
+    if (!this.startButton.disabled) this.start();
   }
 
   // The check -------------------------------------------------------------------------------------------------------------
@@ -230,7 +240,7 @@ export class NewPage {
     const named = once(this.checks?.files ?? []);
     const waits = named.filter((file) => this.outbox.stateOf(file).state !== "sent").length;
     this.startButton.disabled = !(current && this.checks?.valid && !waits && !this.starting);
-    this.startButton.textContent = this.starting ? "Starting …" : waits ? `Waits for ${counted(waits, "file")}` : "Start";
+    this.startButton.textContent = this.starting ? "Starting …" : this.asked && !current ? "Starts after the check" : waits ? `Waits for ${counted(waits, "file")}` : "Start";
     for (const { input, table, name } of this.fields) if (document.activeElement !== input) input.value = valueOf(text, table, name);
     const problems = this.problems(this.checks?.files ?? []);
     const lines = problems.map((one) => place(text, one));
@@ -240,7 +250,8 @@ export class NewPage {
       this.editor.mark(lines.filter((line) => line >= 0));
       this.verdict.replaceChildren(verdict(text, current ? "" : named.length ? "checking the case and reading its files …" : "checking …", this.checks && { ...this.checks, problems }, lines, (line) => this.editor.goTo(line)));
     }
-    this.files.replaceChildren(filesTable(named, this.outbox));
+    this.files.replaceChildren(this.checks || !text.trim() ? filesTable(named, this.outbox) : h("p.hint", {}, "checking …"));
+    this.startIfAsked(current);
   }
 }
 

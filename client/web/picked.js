@@ -1,6 +1,7 @@
 // Data of the selected fragment, its mass and speed over the snapshots, and the table of the heaviest fragments.
 
 import { alike, count, h, si, vector } from "./figures.js";
+import { partsOf } from "./snapshot.js";
 
 const HEAVIEST = 30;
 const [WIDE, TALL] = [200, 40]; // Size of a small chart, px.
@@ -17,11 +18,11 @@ export class Picked {
     this.element = h("section.card.picked", { hidden: "", "aria-label": "the selected fragment" }, close, this.list, this.course);
   }
 
-  // Shows a fragment (snapshot.js) at the time `t` of the shown snapshot; null hides the card.
-  show(found, t) {
+  // Shows a fragment (snapshot.js) of a `part` at the time `t` of the shown snapshot; null hides the card.
+  show(found, t, part) {
     this.element.hidden = !found;
     if (!found) return (this.id = null);
-    this.list.replaceChildren(...facts(found));
+    this.list.replaceChildren(...facts(found, part));
     if (this.id !== found.id) this.read(found.id);
     this.id = found.id;
     this.t = t;
@@ -50,11 +51,11 @@ export class Picked {
 // The time of birth is unknown if parts are separated only by erosion.
 const born = (birth) => (birth === 0 ? "at the start" : si(birth, "s"));
 
-function facts(found) {
+function facts(found, part) {
   return [
     entry("fragment", found.rest ? "the rest" : String(found.id)), entry("mass", si(found.mass, "kg")),
     entry("size", si(found.size, "m")), entry("tets", count(found.tets)),
-    entry("birth", born(found.birth)),
+    entry("part", part || "–"), entry("birth", born(found.birth)),
     entry("speed", si(Math.hypot(...found.velocity), "m/s")), entry("velocity", vector([...found.velocity], "m/s"), true),
     entry("centre", vector([...found.centre], "m"), true),
   ];
@@ -82,18 +83,20 @@ function small(name, t, values, unit) {
 
 // Returns the table of the heaviest fragments of a snapshot. `onPick` is called with the table row of the chosen
 // fragment.
-export function table({ arrays, header }, picked, onPick) {
+export function table(snapshot, picked, onPick) {
+  const { arrays, header } = snapshot;
+  const parts = partsOf(snapshot);
   const { fragment_id: ids, fragment_mass: masses, fragment_size: sizes, fragment_velocity: v, fragment_birth: births } = arrays;
   const rows = [...ids.keys()].filter((row) => ids[row] >= 0n).sort((a, b) => masses[b] - masses[a]).slice(0, HEAVIEST);
   const columns = [
-    alike(rows.map((row) => masses[row]), "kg"), alike(rows.map((row) => Math.hypot(v[3 * row], v[3 * row + 1], v[3 * row + 2])), "m/s"),
+    rows.map((row) => parts[row]), alike(rows.map((row) => masses[row]), "kg"), alike(rows.map((row) => Math.hypot(v[3 * row], v[3 * row + 1], v[3 * row + 2])), "m/s"),
     alike(rows.map((row) => sizes[row]), "m"), rows.map((row) => (births[row] === 0 ? "start" : born(births[row]))),
   ];
   const body = rows.map((row, i) => h("tr", { "aria-selected": String(row === picked) },
-    h("th", { scope: "row" }, h("button.tab", { type: "button", onclick: () => onPick(row) }, String(ids[row]))), columns.map((column) => h("td.number", {}, column[i]))));
+    h("th", { scope: "row" }, h("button.tab", { type: "button", onclick: () => onPick(row) }, String(ids[row]))), columns.map((column, k) => h(k ? "td.number" : "td", {}, column[i]))));
   const more = header.fragments_total - rows.length;
   return [
-    h("table.checks.heaviest", {}, h("thead", {}, h("tr", {}, ["number", "mass", "speed", "size", "birth"].map((name, i) => h(i ? "th.number" : "th", { scope: "col" }, name)))), h("tbody", {}, body)),
+    h("table.checks.heaviest", {}, h("thead", {}, h("tr", {}, ["number", "part", "mass", "speed", "size", "birth"].map((name, i) => h(i > 1 ? "th.number" : "th", { scope: "col" }, name)))), h("tbody", {}, body)),
     more > 0 ? h("p.hint", {}, `and ${count(more)} lighter fragments`) : "",
   ];
 }

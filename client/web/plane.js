@@ -4,6 +4,7 @@ import { within } from "./section.js";
 
 const BESIDE = 0.02; // Distance of the first section from a plane of symmetry, as a fraction of the extent of the body.
 const AXES = ["x", "y", "z"];
+const ALONG = 0.99; // Smallest cosine between the line of sight and the normal for a view across the section.
 export const HOLLOW = "this snapshot has no file of all tets, so its section is not filled";
 
 export class SectionPlane {
@@ -26,6 +27,16 @@ export class SectionPlane {
     const mirror = eye.framed().cuts.find((one) => one.axis === axis);
     const far = mirror && (mirror.at > (along[0] + along[1]) / 2 ? along[0] : along[1]);
     return tools.slide(...along, within(mirror ? mirror.at + BESIDE * (far - mirror.at) : (along[0] + along[1]) / 2, box, this.normal));
+  }
+
+  // Selects the side towards a camera that looks across the section, as the side to cut away. Returns true if the side
+  // has changed.
+  face(eye) {
+    const axis = AXES.indexOf(this.tools.across.value);
+    const way = eye.back()[axis];
+    if (!this.on || axis < 0 || Math.abs(way) < ALONG || this.tools.flipped === way < 0) return false;
+    this.tools.flipped = way < 0;
+    return true;
   }
 
   // Returns { normal, at } for View3d.slice, or null without a section.

@@ -22,6 +22,7 @@ const SLACK = 10; // Time in s by which the saved state of the server may lag.
 const MOST_VALUES = 24; // Largest number of keys that have a column.
 const MOST_TOLD = 100; // Largest number of groups whose changed keys are shown.
 const RANGES = 3; // Largest number of keys in the title of a group.
+const WORDS = 4; // Largest number of values of a key of words in the title of a group.
 const NEWEST = { id: "submitted", down: true };
 // Choices of the user, stored as long as the tab exists.
 const kept = { text: "", state: "", days: "", open: new Set(), marked: new Set(), top: 0 };
@@ -291,7 +292,9 @@ function soughtFor({ key, result, threshold, result_unit: up, bracket, unit }, t
 function ranges(rows, columns) {
   return differing(rows, RANGES).map((key) => columns.find(({ id }) => id === `value:${key}`)).filter(Boolean).map((column) => {
     const there = sorted(rows.filter((row) => column.value(row) !== null), column, false);
-    return `${column.title} ${column.text(there[0])} to ${column.text(there.at(-1))} ${column.unit ?? ""}`.trim();
+    const words = [...new Set(there.map(column.text))];
+    if (!column.number) return `${column.title} ${words.slice(0, WORDS).join(" | ")}${words.length > WORDS ? " …" : ""}`;
+    return `${column.title} ${words[0]} to ${words.at(-1)} ${column.unit ?? ""}`.trim();
   }).join(", ");
 }
 

@@ -7,6 +7,7 @@ import { ended } from "./numbers.js";
 
 const LOGS = { 0: "log/rank-0.log", launcher: "log/launcher.log" };
 const LINES = 12; // Number of lines of the log that are shown.
+const NOISE = /^MPICH: freeing /; // Lines that MPICH prints at the end of a process that has failed.
 const CAUSES = {
   input: "its case cannot be run", mesh: "its mesh cannot be made", diverged: "its solution has diverged", energy: "its energy does not close",
   memory: "it ran out of memory", walltime: "the run reached its limit of wall time", steps: "it reached run.max_steps before run.end_time",
@@ -18,7 +19,7 @@ const HELP = {
   diverged: "Check the last snapshot and dt before the end; a smaller numerics.dt_safety or erosion of distorted tets may help.",
   energy: "The chart of energy by term shows which term has grown.",
   memory: "Use larger elements, or a machine with more memory.", walltime: "Continue from the last checkpoint, or increase run.max_wall_time.",
-  steps: "Continue with a larger run.max_steps; the limiter of dt is shown beside it.", storage: "Free space on the disk, then continue from the last checkpoint.",
+  steps: "Continue with a larger run.max_steps; the limiter of dt is shown beside it.", storage: "Make space for the files of the run, then continue from the last checkpoint.",
 };
 const POINT = /^checkpoints\/(\d+)\/manifest\.json$/;
 // Causes of failure that would recur with the same case.
@@ -83,7 +84,8 @@ export class RunState {
     const logs = live.progress ? ["0", "launcher"] : ["launcher", "0"];
     for (const name of logs.filter((one) => !files || there.has(LOGS[one]))) {
       const text = (await tail(this.run, name).catch(() => "")).trimEnd();
-      if (text) return text.split("\n").slice(-LINES).join("\n");
+      const lines = text.split("\n").filter((line) => !NOISE.test(line));
+      if (lines.join("")) return lines.slice(-LINES).join("\n");
     }
     return "";
   }

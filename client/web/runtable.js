@@ -73,6 +73,7 @@ const hay = ({ name, title, state, cause, message, labels }) =>
 export const valueOf = (row, key) => (key in row.values ? row.values[key] : row.base[key] ?? null);
 
 const NEVER = /^run\.(ranks|threads|profile)$/; // Keys that have columns of their own.
+const MATERIAL = /^materials\./; // Constants of a material; a case has those of its own materials only.
 
 // Smallest number of runs that a prominent key distinguishes, relative to the number for the first key. Chosen value.
 const LEAST = 0.1;
@@ -108,6 +109,8 @@ function ranked(rows) {
     if (bases.size > 1) for (const base of bases) for (const key of Object.keys(base)) keys.add(key);
     for (const key of keys) {
       const values = own.map((row) => valueOf(row, key));
+      // The key `material` of a part shows which material a case has; the constants of the material do not differ.
+      if (MATERIAL.test(key) && values.includes(null)) continue;
       const apart = spread(values);
       const known = found.get(key) ?? { apart: 0, courses: [] };
       if (apart) found.set(key, { key, apart: known.apart + apart, courses: [...known.courses, `${number}: ${values.join()}`] });

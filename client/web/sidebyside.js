@@ -23,7 +23,7 @@ export class SideBySide {
     this.clock = h("input", { type: "range", min: 0, max: STEPS, step: 1, value: STEPS, "aria-label": "simulated time", oninput: () => this.tick() });
     this.clockText = h("span.note");
     this.tools = new Tools({
-      colour: () => this.paint(), section: () => this.choose(), slice: () => this.slice(), camera: (name) => this.view?.eye.view(name),
+      colour: () => this.paint(), section: () => this.choose(), slice: () => this.slice(), camera: (name) => this.look(name),
       follow: (text) => this.follow(text), set: (name, value) => this.set(name, value), opacities: () => this.fade(),
     }, ["Fragments", "Save"]);
     this.plane = new SectionPlane(this.tools);
@@ -147,6 +147,12 @@ export class SideBySide {
     if (!first) return;
     this.plane.choose(first.view.eye, first.snapshot.header.box);
     this.slice();
+  }
+
+  look(name) {
+    if (!this.view) return;
+    this.view.eye.view(name);
+    if (this.plane.face(this.view.eye)) this.slice();
   }
 
   slice() {

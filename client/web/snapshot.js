@@ -58,6 +58,13 @@ export function cornerValues({ arrays }, by) {
   return out;
 }
 
+// Returns the names of the parts of each fragment, joined by " + "; a fragment without triangles has no name.
+export function partsOf({ header, arrays }) {
+  const found = Array.from({ length: arrays.fragment_id.length }, () => new Set());
+  arrays.triangle_part?.forEach((part, i) => found[arrays.vertex_fragment[arrays.triangles[3 * i]]].add(header.parts[part]));
+  return found.map((names) => [...names].join(" + "));
+}
+
 // Returns a row of the table of fragments in SI; `rest` is true if the row stands for all fragments without a row of
 // their own.
 export function fragment({ arrays }, row) {

@@ -115,6 +115,11 @@ class WallTimeOver:
 class OutputOver:
     """Event: the folder of the run has exceeded its largest size."""
 
+    size: int
+    """Size of the folder, bytes."""
+    most: int
+    """Largest size, bytes."""
+
 
 @dataclass(frozen=True)
 class GraceOver:

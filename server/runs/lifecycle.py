@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import msgspec
 
+from conoid.cases.figures import size
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import Cause, ExitCode, State
 
@@ -81,7 +82,7 @@ def advance(run: Run, event: Event, now: float) -> Next:
         case WallTimeOver() if run.state in {State.STARTING, State.RUNNING}:
             return _stop(run, Cause.WALLTIME)
         case OutputOver() if run.state in {State.STARTING, State.RUNNING}:
-            return _stop(run, Cause.STORAGE)
+            return _stop(replace(run, message=_too_large(event)), Cause.STORAGE)
         case GraceOver() if run.state is State.STOPPING:
             return run, (Kill(),)
         case WorkerExited() if run.state is not State.ACCEPTED:
@@ -116,6 +117,13 @@ def _broken(run: Run, event: Broken, now: float) -> Next:
     outcome = Outcome(state=state, cause=cause, message=message, ranks=run.ranks, threads=run.threads)
     ended, actions = _end(run, now, outcome)
     return ended, (Kill(), *actions) if event.writable else (Kill(),)
+
+
+def _too_large(event: OutputOver) -> str:
+    return (
+        f"the files of the run have {size(event.size)}; this server allows {size(event.most)} for a run: reduce "
+        "run.frames, run.snapshots or run.fields"
+    )
 
 
 def _cancel(run: Run, now: float, handed: bool) -> Next:
@@ -158,7 +166,7 @@ def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
     but not why. Without a request for a cancel, the stop does not count as a cancel.
     """
     if run.stopping_for is Cause.STORAGE:
-        state, message = State.FAILED, "the output of the run is larger than this server allows"
+        state, message = State.FAILED, run.message or "the files of the run are larger than this server allows"
         return msgspec.structs.replace(outcome, state=state, cause=Cause.STORAGE, message=message)
     if event.reading is not None:
         state, cause, message = event.reading

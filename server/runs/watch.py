@@ -77,9 +77,9 @@ class Watch:
             yield WallTimeOver()
         elif self._most is not None and now >= self._weigh_at:
             self._weigh_at = now + _WEIGHED
-            if disk_usage.size(self._folder) > self._most:
+            if (size := disk_usage.size(self._folder)) > self._most:
+                yield OutputOver(size, self._most)
                 self._most = None
-                yield OutputOver()
 
     def _turn(self) -> Iterator[Event]:
         """Yields an event if the worker has got its cores, or waits for cores again."""

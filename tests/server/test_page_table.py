@@ -146,6 +146,23 @@ def test_a_column_has_one_unit_and_short_names_that_are_clear(ask: Ask, some: di
     assert "result:cpu" not in shown
 
 
+def test_a_sweep_over_materials_differs_in_the_material(ask: Ask) -> None:
+    """The constants of a material do not differ, because other cases lack this material. A column has only the first
+    digits of a hash.
+    """
+    names = ["steel", "steel", "copper", "copper", "lead", "lead"]
+    material, file = "parts[0].material", "parts[0].mesh.sha256"
+    own = [{f"materials.{name}.{key}": 8e3 for key in ("density", "young")} for name in names]
+    values = [{material: name, file: f"{n:08x}{'0' * 56}", **own[n]} for n, name in enumerate(names)]
+    same = {f"k{i}": i for i in range(40)}
+    made = [(line(f"run{n}", n), card.Card(values={**same, **one}, results={})) for n, one in enumerate(values)]
+    script = (
+        f"{COLUMNS} return [differing(all, 9), ['{material}', '{file}'].map((key) => by('value:' + key).text(all[2]))];"
+    )
+    keys, texts = ask(MODULES, f"(() => {{ {script} }})()", answer(*made))
+    assert (keys, texts) == ([file, material], ["copper", "00000002"])
+
+
 @pytest.mark.parametrize(
     ("words", "found"),
     [
