@@ -20,7 +20,19 @@ from .commands import benches, converging, hard, listing, reports, server_runs, 
 from .commands.batch import batch_run
 from .commands.console import echo, echo_json, one_line, prepare
 from .commands.helping import Grouped
-from .commands.options import FILE_OPTIONS, CaseArgument, Json, Overrides, Ranks, aloud, complain, on_cores, show, warn
+from .commands.options import (
+    FILE_OPTIONS,
+    CaseArgument,
+    Json,
+    Overrides,
+    Ranks,
+    Threads,
+    aloud,
+    complain,
+    on_cores,
+    show,
+    warn,
+)
 from .commands.run_command import run_once
 from .decks.command import import_deck
 from .drawing.fields import FIELDS
@@ -108,13 +120,15 @@ def serve(ctx: typer.Context) -> None:
 
 
 @app.command(short_help="Check a case and estimate its needs.")
-def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = False) -> None:
+def validate(
+    case: CaseArgument, overrides: Overrides = None, ranks: Ranks = None, threads: Threads = None, as_json: Json = False
+) -> None:
     """Check a case: errors, warnings, content of its parts, cost.
 
     The command reads mesh files and needs no server. Warnings go to standard error and leave the exit code 0.
     """
     with aloud("reading mesh files"):
-        found = examine(data_of(case, overrides or ()), locate(case).parent)
+        found = examine(data_of(case, [*(overrides or ()), *on_cores(ranks, threads)]), locate(case).parent)
     checked, expected, odd = found.case, found.expected, found.odd
     if as_json:
         answer = {

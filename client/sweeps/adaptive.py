@@ -19,11 +19,11 @@ from ..remote.http import Me
 from ..remote.outbox import Outbox
 from ..remote.run_info import RunInfo
 from ..run import Run
-from . import ballistic
 from .adaptive_result import Book, Found, Tried
-from .bracket import Bracket, Sample, between, bracket, widest
+from .bracket import Sample, between, bracket, widest
+from .fitting import fitted, unfitted
 from .goal import Goal, Span, changes, goal_of, tolerance_of
-from .reporting import Reported, Reporter, in_si
+from .reporting import Reported, Reporter
 
 MOST = 40
 """Largest number of runs if the user gives no number. Chosen value: 20 bisections narrow a bracket to a millionth."""
@@ -145,7 +145,7 @@ def _counted(wanted: Search, book: Book, fresh: Sequence[Tried]) -> list[Tried]:
 def _report(wanted: Search, reporter: Reporter, tried: Sequence[Tried], *, over: bool = False, why: str = "") -> None:
     ended = [each for each in tried if each.value is not None]
     made = bracket(_samples(ended))
-    fit = None if made is None else _fit(wanted, ended, made)
+    fit = None if made is None else fitted(wanted.goal, wanted.spans[0], _samples(ended), made)
     reporter.tell(tried, made, fit, over=over, why=why)
 
 
@@ -258,21 +258,10 @@ def _found(wanted: Search, tried: Sequence[Tried], why: str, fresh: int) -> Foun
         ends = [(x, values[x]) for x in wanted.ends if x in values]
         return base.but(ends=ends)
     ends = [(sample.x, values[sample.x]) for sample in (made.low, made.high)]
-    fit = _fit(wanted, tried, made)
+    at = wanted.goal, span, _samples(tried), made
+    fit = fitted(*at)
     return base.but(ends=ends, limit=0.5 * (made.low.x + made.high.x), uncertainty=0.5 * made.width, fit=fit,
-                    changes=made.changes, mixed=made.mixed)  # fmt: skip
-
-
-def _fit(wanted: Search, tried: Sequence[Tried], made: Bracket) -> ballistic.Fit | None:
-    """Fits the law of residual velocity over impact velocity, or a line near the point at which the result crosses
-    the threshold.
-    """
-    samples = _samples(tried)
-    speeds = wanted.spans[0].unit.endswith("/s") and wanted.goal.unit == "m/s"
-    if speeds and ballistic.stops(samples, made, wanted.goal.threshold):
-        return ballistic.residual_velocity(samples, made, wanted.goal.threshold, in_si(wanted.spans[0])[0])
-    known = [sample.f for sample in samples if sample.f is not None]
-    return ballistic.line(samples, made) if min(known) < 0.0 < max(known) and made.changes == 1 else None
+                    no_fit="" if fit else unfitted(*at), changes=made.changes, mixed=made.mixed)  # fmt: skip
 
 
 # Words ----------------------------------------------------------------------------------------------------------------

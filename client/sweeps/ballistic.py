@@ -10,7 +10,7 @@ import msgspec
 
 from .bracket import Bracket, Sample
 
-_FREE, _FIXED = 4, 3
+_FREE, FEWEST = 4, 3
 """Smallest number of points for a fit with a free exponent, and for a fit with a fixed exponent. Each number is one
 more than the number of constants, so that the error can be estimated."""
 _NEAREST = 4
@@ -55,6 +55,11 @@ def stops(samples: Sequence[Sample], found: Bracket, threshold: float) -> bool:
     return found.changes == 1 and max(y for _, y in before) <= _STOPPED * max(y for _, y in beyond)
 
 
+def beyond(samples: Sequence[Sample], found: Bracket, threshold: float) -> int:
+    """Returns the number of points from the upper end of the bracket on, to which a law of velocities is fitted."""
+    return len(_sides(samples, found, threshold)[1])
+
+
 def residual_velocity(samples: Sequence[Sample], found: Bracket, threshold: float, scale: float = 1.0) -> Fit | None:
     """Fits v_r = a (v^p - v_bl^p)^(1/p) to the points above the limit (Lambert and Jonas, BRL R-1828, 1976). With p = 2
     this is the law of Recht and Ipson (J. Appl. Mech. 30, 1963), in which a is the mass of the projectile over the sum
@@ -66,7 +71,7 @@ def residual_velocity(samples: Sequence[Sample], found: Bracket, threshold: floa
     follow the law.
     """
     x, y = zip(*_sides(samples, found, threshold)[1], strict=True)
-    if len(x) < _FIXED:
+    if len(x) < FEWEST:
         return None
     made = (_lambert_jonas if len(x) >= _FREE else _recht_ipson)([scale * v for v in x], y)
     return made and _in_unit(made, scale)

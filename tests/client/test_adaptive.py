@@ -22,10 +22,12 @@ from conoid.client.sweeps.adaptive import found_by
 from conoid.client.sweeps.adaptive_result import Found, read, table
 from conoid.client.sweeps.ballistic import Fit, course, residual_velocity
 from conoid.client.sweeps.bracket import Bracket, Sample, between, bracket, widest
-from conoid.client.sweeps.goal import Goal, span_of, spans_of, tolerance_of
+from conoid.client.sweeps.fitting import fitted, unfitted
+from conoid.client.sweeps.goal import Goal, Span, span_of, spans_of, tolerance_of
 from conoid.client.sweeps.reporting import Reported
 
 KEY = "parts[0].velocity[2]"
+NO_LAW = "the results above the limit do not follow the law of Lambert and Jonas"
 CASE = {
     "name": "shot",
     "parts": [{
@@ -222,6 +224,14 @@ def test_points_that_do_not_follow_the_law_have_no_curve() -> None:
     made = bracket(shots)
     assert made is not None
     assert residual_velocity(shots, made, 5.0) is None
+    goal, span = Goal(result="probe.left", threshold=5.0, unit="m/s"), Span(key=KEY, low=20.0, high=200.0, unit="m/s")
+    assert (fitted(goal, span, shots, made), unfitted(goal, span, shots, made)) == (None, NO_LAW)
+    few = [shot for shot in shots if not 30.0 < shot.x < 150.0]
+    rough = bracket(few)
+    assert rough is not None
+    assert unfitted(goal, span, few, rough) == "fewer than 3 results above the limit"
+    text = find(Firing(lambda v: max(0.0, v - 500.0) ** 0.01)).lines()
+    assert f"no fitted curve: {NO_LAW}" in text
 
 
 def test_a_result_that_goes_through_a_threshold_has_a_line() -> None:

@@ -195,5 +195,7 @@ def test_brep_files_that_are_cut_off_and_huge_files_are_refused(folder: Path, br
 
 def test_a_name_or_number_that_is_not_there_is_refused(folder: Path, step: str) -> None:
     for wanted in ("Nope", 4):
-        with pytest.raises(MeshError, match="is not in the file, which has 3 solids: 'Core', \"Rod, 'x'\", 'Jacket'"):
+        with pytest.raises(
+            MeshError, match="is not in the file, which has 3 solids: 1 'Core', 2 \"Rod, 'x'\", 3 'Jacket'"
+        ):
             made(folder / "names.step", step, solids=[wanted])

@@ -213,6 +213,6 @@ def _names(label: str) -> list[str]:
 
 
 def _listed(solids: Solids, names: list[list[str]]) -> str:
-    listed = [repr(known[-1]) if known[-1] else str(n) for n, known in enumerate(names, 1)]
+    listed = [f"{n} {known[-1]!r}" if known[-1] else str(n) for n, known in enumerate(names, 1)]
     more = ", ..." if len(listed) > 20 else ""
     return f"{len(solids)} solids: {', '.join(listed[:20])}{more}"
