@@ -29,8 +29,8 @@ export class SectionPlane {
     return tools.slide(...along, within(mirror ? mirror.at + BESIDE * (far - mirror.at) : (along[0] + along[1]) / 2, box, this.normal));
   }
 
-  // Selects the side towards a camera that looks across the section, as the side to cut away. Returns true if the side
-  // has changed.
+  // Cuts away the side towards the camera if the line of sight is across the section. Returns true if the side has
+  // changed.
   face(eye) {
     const axis = AXES.indexOf(this.tools.across.value);
     const way = eye.back()[axis];
