@@ -127,6 +127,7 @@ def search(session: Server, wanted: Search, book: Book, reporter: Reporter, say:
         if not following:
             found = _found(wanted, tried, why, len(fresh))
             _report(wanted, reporter, tried, over=True, why=found.unsettled)
+            _explain(wanted, tried, found, say)
             return found
         at(f"{counted(len(following), 'run')} at {', '.join(map(number, following))} {wanted.spans[0].unit}".strip())
         for each, open_ones in _round(session, wanted, reporter, tried, following):
@@ -134,6 +135,13 @@ def search(session: Server, wanted: Search, book: Book, reporter: Reporter, say:
             book.add(each)
             _report(wanted, reporter, [*_counted(wanted, book, fresh), *open_ones])
             say(f"{_at(wanted, each.x)}: {_result_text(wanted, each)}; {_state(wanted, [*tried, *fresh])}")
+
+
+def _explain(wanted: Search, tried: Sequence[Tried], found: Found, say: Say) -> None:
+    """Calls ``say`` with the reason why the result has no fitted curve."""
+    made = bracket(_samples(tried))
+    if made is not None and found.fit is None:
+        say(f"no fitted curve: {unfitted(wanted.goal, wanted.spans[0], _samples(tried), made)}")
 
 
 def _counted(wanted: Search, book: Book, fresh: Sequence[Tried]) -> list[Tried]:
@@ -258,10 +266,9 @@ def _found(wanted: Search, tried: Sequence[Tried], why: str, fresh: int) -> Foun
         ends = [(x, values[x]) for x in wanted.ends if x in values]
         return base.but(ends=ends)
     ends = [(sample.x, values[sample.x]) for sample in (made.low, made.high)]
-    at = wanted.goal, span, _samples(tried), made
-    fit = fitted(*at)
+    fit = fitted(wanted.goal, span, _samples(tried), made)
     return base.but(ends=ends, limit=0.5 * (made.low.x + made.high.x), uncertainty=0.5 * made.width, fit=fit,
-                    no_fit="" if fit else unfitted(*at), changes=made.changes, mixed=made.mixed)  # fmt: skip
+                    changes=made.changes, mixed=made.mixed)  # fmt: skip
 
 
 # Words ----------------------------------------------------------------------------------------------------------------

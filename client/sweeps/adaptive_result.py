@@ -55,8 +55,6 @@ class Found(msgspec.Struct, kw_only=True, frozen=True):
     limit: float | None = None
     uncertainty: float | None = None
     fit: Fit | None = None
-    no_fit: str = ""
-    """Reason why there is no fitted curve, if there is a bracket."""
     changes: int = 0
     """Number of times that the result crosses the threshold."""
     mixed: tuple[float, float] | None = None
@@ -95,8 +93,6 @@ class Found(msgspec.Struct, kw_only=True, frozen=True):
                     "the limit of the fitted curve lies outside of the bracket, because the results near the "
                     "bracket do not follow the law"
                 )
-        elif self.no_fit:
-            text.append(f"no fitted curve: {self.no_fit}")
         if self.why:
             text.append(f"bracket wider than requested ({self._x(self.tolerance)}): {self.why}")
         failed = f", {self.failed} without a result" if self.failed else ""

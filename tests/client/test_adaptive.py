@@ -230,8 +230,12 @@ def test_points_that_do_not_follow_the_law_have_no_curve() -> None:
     rough = bracket(few)
     assert rough is not None
     assert unfitted(goal, span, few, rough) == "fewer than 3 results above the limit"
-    text = find(Firing(lambda v: max(0.0, v - 500.0) ** 0.01)).lines()
-    assert f"no fitted curve: {NO_LAW}" in text
+    lines: list[str] = []
+    at = Firing(lambda v: max(0.0, v - 500.0) ** 0.01)
+    found_by(
+        at, CASE, Path(), "probe.left = 0", [span_of(KEY, ("200 m/s", "800 m/s"))], "5 m/s", 1, 40, None, lines.append
+    )
+    assert lines[-1] == f"no fitted curve: {NO_LAW}"
 
 
 def test_a_result_that_goes_through_a_threshold_has_a_line() -> None:
