@@ -135,9 +135,9 @@ export class NewPage {
     this.draw();
   }
 
-  // Starts the run if the user has asked for the start; during a check, the start waits for the end of the check.
-  startIfAsked(current) {
-    if (!this.asked || (!current && this.editor.text.trim())) return;
+  // Starts the run if the user has asked for the start; the start waits for the end of a check and for `waits` files.
+  startIfAsked(current, waits) {
+    if (!this.asked || (!current && this.editor.text.trim()) || (waits && this.checks?.valid)) return;
     this.asked = false;
     if (!this.startButton.disabled) this.start();
   }
@@ -251,7 +251,7 @@ export class NewPage {
       this.verdict.replaceChildren(verdict(text, current ? "" : named.length ? "checking the case and reading its files …" : "checking …", this.checks && { ...this.checks, problems }, lines, (line) => this.editor.goTo(line)));
     }
     this.files.replaceChildren(this.checks || !text.trim() ? filesTable(named, this.outbox) : h("p.hint", {}, "checking …"));
-    this.startIfAsked(current);
+    this.startIfAsked(current, waits);
   }
 }
 

@@ -92,6 +92,16 @@ def test_a_shipped_case_is_mended_started_and_started_again_with_changes(site: S
     assert case_of(site, again)["run"]["ranks"] == 2
 
 
+def test_a_start_during_the_check_follows_the_check(site: Site, page: Page) -> None:
+    page.slide("select[aria-label^='start from']", "two_tets")
+    page.wait(f"document.querySelector(\"{EDITOR}\").value.includes('end_time')", LONG)
+    page.focus(EDITOR)
+    page.press("Enter", 2)
+    assert page.evaluate(f"document.querySelector('{START}').innerText") == "Starts after the check"
+    run = str(page.wait("/^#.runs.([a-z0-9]{22})$/.exec(location.hash)?.[1]", LONG))
+    assert case_of(site, run)["name"] == "two_tets"
+
+
 def test_a_case_is_sent_with_its_mesh_file_and_opened_again(site: Site, page: Page, tmp_path: Path) -> None:
     text = shipped_path("imported_taylor").read_text()
     text = text.replace('path = "imported_taylor.inp"', 'path = "sub/taylor mine.inp"')
