@@ -152,9 +152,11 @@ def test_a_sweep_over_materials_differs_in_the_material(ask: Ask) -> None:
     """
     names = ["steel", "steel", "copper", "copper", "lead", "lead"]
     material, file = "parts[0].material", "parts[0].mesh.sha256"
-    own = [{f"materials.{name}.{key}": 8e3 for key in ("density", "young")} for name in names]
-    values = [{material: name, file: f"{n:08x}{'0' * 56}", **own[n]} for n, name in enumerate(names)]
-    same = {f"k{i}": i for i in range(40)}
+    own: list[dict[str, Scalar]] = [{f"materials.{name}.{key}": 8e3 for key in ("density", "young")} for name in names]
+    values: list[dict[str, Scalar]] = [
+        {material: name, file: f"{n:08x}{'0' * 56}", **own[n]} for n, name in enumerate(names)
+    ]
+    same: dict[str, Scalar] = {f"k{i}": i for i in range(40)}
     made = [(line(f"run{n}", n), card.Card(values={**same, **one}, results={})) for n, one in enumerate(values)]
     script = (
         f"{COLUMNS} return [differing(all, 9), ['{material}', '{file}'].map((key) => by('value:' + key).text(all[2]))];"
