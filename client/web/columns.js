@@ -2,7 +2,8 @@
 
 import { count, duration, exact, percent, scaleOf, si, UNKNOWN, when } from "./figures.js";
 import { FINAL } from "./live.js";
-import { prominent, valueOf } from "./runtable.js";
+import { differing, prominent, valueOf } from "./runtable.js";
+import { sorted } from "./sorting.js";
 import { titles } from "./titles.js";
 
 const STATES = ["running", "stopping", "starting", "queued", "accepted", "succeeded", "cancelled", "timed_out", "failed", "lost"];
@@ -37,6 +38,8 @@ const IF_ANY = new Set(["references", "labels"]); // Columns that are shown only
 const unsure = ({ state }) => state !== "succeeded";
 const TELLING = /^(fragments|reference\.penetration.*)$/; // Results whose columns are shown by default.
 const MOST_PROBES = 4; // Largest number of probes whose columns are shown by default.
+const RANGES = 3; // Largest number of keys in the title of a group.
+const WORDS = 4; // Largest number of values of a key of words in the title of a group.
 const HASH = /\.sha256$/; // Keys whose value is a hash, of which a column shows the first DIGITS digits.
 const DIGITS = 8;
 const MOST_VALUES = 6; // Largest number of keys of the case whose columns are shown by default.
@@ -100,4 +103,14 @@ function numeric(rows, column) {
   const measured = (one) => (!unit && Number.isInteger(one) ? count(one) : si(one / worth, "", 4));
   const text = (one) => (one === null ? "" : column.exact ? exact(one / worth) : measured(one));
   return { ...column, number: values.length > 0, worth, base: unit, unit: name, write: text, text: (row) => text(value(row)) };
+}
+
+// Returns a text with the changed keys of a group, such as "velocity[2] 60 to 300 m/s".
+export function ranges(rows, columns) {
+  return differing(rows, RANGES).map((key) => columns.find(({ id }) => id === `value:${key}`)).filter(Boolean).map((column) => {
+    const there = sorted(rows.filter((row) => column.value(row) !== null), column, false);
+    const words = [...new Set(there.map(column.text))];
+    if (!column.number) return `${column.title} ${words.slice(0, WORDS).join(" | ")}${words.length > WORDS ? " …" : ""}`;
+    return `${column.title} ${words[0]} to ${words.at(-1)} ${column.unit ?? ""}`.trim();
+  }).join(", ");
 }

@@ -2,7 +2,7 @@
 
 import { Problem, call, refused } from "./api.js";
 import { unanswered } from "./away.js";
-import { columnsOf } from "./columns.js";
+import { columnsOf, ranges } from "./columns.js";
 import { count, counted, exact, h, vector } from "./figures.js";
 import { Grid } from "./grid.js";
 import { FINAL } from "./live.js";
@@ -21,8 +21,6 @@ const ANEW = 60000;
 const SLACK = 10; // Time in s by which the saved state of the server may lag.
 const MOST_VALUES = 24; // Largest number of keys that have a column.
 const MOST_TOLD = 100; // Largest number of groups whose changed keys are shown.
-const RANGES = 3; // Largest number of keys in the title of a group.
-const WORDS = 4; // Largest number of values of a key of words in the title of a group.
 const NEWEST = { id: "submitted", down: true };
 // Choices of the user, stored as long as the tab exists.
 const kept = { text: "", state: "", days: "", open: new Set(), marked: new Set(), top: 0 };
@@ -286,16 +284,6 @@ export class RunsPage {
 function soughtFor({ key, result, threshold, result_unit: up, bracket, unit }, titled) {
   const found = bracket ? vector([(bracket[0] + bracket[1]) / 2, (bracket[1] - bracket[0]) / 2], unit, 4, " ± ") : "not bracketed";
   return `${titled(result)} = ${exact(threshold, up)} at ${titled(key)} ${found}`;
-}
-
-// Returns a text with the changed keys of a group, such as "velocity[2] 60 to 300 m/s".
-function ranges(rows, columns) {
-  return differing(rows, RANGES).map((key) => columns.find(({ id }) => id === `value:${key}`)).filter(Boolean).map((column) => {
-    const there = sorted(rows.filter((row) => column.value(row) !== null), column, false);
-    const words = [...new Set(there.map(column.text))];
-    if (!column.number) return `${column.title} ${words.slice(0, WORDS).join(" | ")}${words.length > WORDS ? " …" : ""}`;
-    return `${column.title} ${words[0]} to ${words.at(-1)} ${column.unit ?? ""}`.trim();
-  }).join(", ");
 }
 
 const beginning = () => h("div.empty", {}, h("h2", {}, "No runs yet"),
