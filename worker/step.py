@@ -68,8 +68,8 @@ def first_half(sim: Simulation) -> None:
     mean_dt = clock.choose(sim.limit)  # Row 1: choose dt, the step from n to n+1.
     if clock.collapsed:
         raise PhysicsError(
-            f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s. Where its "
-            "part erodes (parts[].erosion) such a tet is removed"
+            f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s. If its "
+            "part has parts[].erosion, such a tet is removed"
         )
     acts = sim.acts
     _before_kick(sim, acts)  # Rows 2 to 4: add the work of the last impulses, remove tets, run the broad phase.
@@ -168,7 +168,7 @@ def complete(sim: Simulation) -> None:
     """Executes rows 14 and 15 of the table: completion of shared nodes, reduction, and fracture. Raises PhysicsError if
     a tet has failed.
 
-    The last step of a program (stretch.py) ends with this function.
+    The last step of a program (stretch.py) ends with the function ``complete``.
     """
     _offer_contact(sim)
     _reduce(sim, sim.fracture)

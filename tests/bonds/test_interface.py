@@ -142,4 +142,4 @@ def test_distances_above_the_gap_are_refused_or_counted() -> None:
     tilted.points[:, 2] += 0.2 * tilted.points[:, 0]
     _, found, *_ = rows_of(one, tilted, "gap = 0.3")
     assert len(found.warnings) == 1
-    assert "nodes of 'below' are not tied: up to 0.8 m lie between them and 'above'" in found.warnings[0]
+    assert "nodes of 'below' are not tied: their distance from 'above' is up to 0.8 m" in found.warnings[0]

@@ -45,7 +45,13 @@ def test_an_interface_that_has_eroded_ties_nothing() -> None:
 @pytest.mark.parametrize(("velocity", "warned"), [("velocity = [0, 0, 3]", 1), ("", 0)])
 def test_bonded_parts_of_two_velocities_are_reported(velocity: str, warned: int) -> None:
     found = assemble(load.parse_toml(joint(below=velocity)), Path()).warnings
-    assert sum("'below' and 'above' start at two velocities where they are tied, up to 3" in w for w in found) == warned
+    assert (
+        sum(
+            "'below' and 'above' start with different velocities at their bond; the difference is up to 3" in w
+            for w in found
+        )
+        == warned
+    )
 
 
 @pytest.mark.parametrize("third", ["shared", "tied", ""])

@@ -41,8 +41,8 @@ def test_a_scene_that_is_too_small_for_threads_is_reported_once(monkeypatch: pyt
     team = Team(4)
     reports, done = steps(team, Choice(team), 40)
     assert len(reports) == 1
-    assert reports[0].startswith("the scene is too small for 4 threads and uses 1. A colour has 12.0 tasks of ")
-    assert "to share a colour costs 100 ms, to wake a thread 10.0 ms" in reports[0]
+    assert reports[0].startswith("the scene is too small for 4 threads; the run uses 1. A colour has 12.0 tasks of ")
+    assert "the sharing of a colour takes 100 ms, the waking of a thread 10.0 ms" in reports[0]
     assert team.most == 1
     assert (done == 40).all()
 

@@ -239,7 +239,7 @@ def test_wall_time_and_steps_run_out(tmp_path: Path) -> None:
     assert short.returncode == 4
     end = outcome(tmp_path / "short")
     assert (end.state, end.cause, end.steps) == ("timed_out", "steps", 20)
-    assert end.message.startswith("run.max_steps is used up before run.end_time, at ")
+    assert end.message.startswith("the run reached run.max_steps before run.end_time, at ")
     more = ("--set", "run.max_steps=30", "--restart")
     assert ended(command(1, "free_spin", "--out", str(tmp_path / "short"), *LONG, *more)).returncode == 4
     assert outcome(tmp_path / "short").steps == 30

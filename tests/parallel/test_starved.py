@@ -80,7 +80,7 @@ def test_a_run_out_of_steps_reports_its_step_sizes(tmp_path: Path, ranks: int) -
     """At the end of the run the body has a fifth of its initial height."""
     end = outcome(tmp_path, "1.1 ms", ranks, "--set", "run.max_steps=300")
     assert (end.state, end.cause, end.steps, warned(end)) == ("timed_out", "steps", 300, [])
-    assert end.message.startswith("run.max_steps is used up before run.end_time, at 0.0008")
+    assert end.message.startswith("the run reached run.max_steps before run.end_time, at 0.0008")
     assert "; the stable step has fallen to " in end.message
     assert " of the first (stability: tet " in end.message
     assert end.message.endswith(" steps are left; erosion.time_step removes such tets")

@@ -300,7 +300,7 @@ def test_a_wrong_number_of_ranks_is_reported(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "conoid.worker", "two_tets", "--out", str(tmp_path / "out"), "--ranks", "2"]
     ended = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
     assert ended.returncode == 1
-    assert "MPI has started 1 rank(s) where 2 were asked for" in ended.stderr
+    assert "MPI has started 1 rank(s) instead of 2" in ended.stderr
     assert not (tmp_path / "out").exists()
 
 

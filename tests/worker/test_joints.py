@@ -208,6 +208,6 @@ def test_nodes_of_two_parts_are_of_both() -> None:
 def test_parts_that_start_at_two_speeds_share_them_at_their_nodes() -> None:
     case = joint(("alumina", "steel"), upper={"velocity": [0, 0, "4 m/s"]})
     ((warnings, v),) = on(1, case, PARTS, lambda sim: (sim.warnings, np.unique(sim.model.nodes.v[:, 2]).tolist()))
-    assert any("16 nodes of 'lower' and 'upper' have two initial velocities" in line for line in warnings)
+    assert any("16 nodes of 'lower' and 'upper' have two different initial velocities" in line for line in warnings)
     assert len(v) > 2
     assert all(0.0 <= each <= 4.0 for each in v)

@@ -171,7 +171,9 @@ def test_motion_without_a_source_of_energy_ends_the_run() -> None:
         before *= math.sqrt(1.2)
         sim.model.nodes.v[:] *= math.sqrt(1.2)
         sim.ledger.close(before)
-        with pytest.raises(EnergyError, match=r"the kinetic energy above all energy received, 0\.\d+, passed run\."):
+        with pytest.raises(
+            EnergyError, match=r"the kinetic energy exceeds all received energy by 0\.\d+ of the largest"
+        ):
             sim.ledger.require(sim.case.run, 0.9, "now")
         ran = True
 

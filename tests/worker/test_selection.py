@@ -251,7 +251,7 @@ def test_a_mesh_that_differs_from_the_expected_values_is_reported(caplog: pytest
     shorter = TetMesh(made.points * [1.0, 1.0, 0.975], made.tets)
     shorter.points[:, 0] += (shorter.points[:, 1] > 1.9e-3) * 2e-5  # one node of the layer is outside of the box
     (warning,) = whole_of(case, shorter).warnings
-    assert warning.startswith("boundaries[0]: drives 24 nodes, where validate expects 25 nodes; check its box")
+    assert warning.startswith("boundaries[0]: drives 24 nodes, but `conoid validate` predicts 25 nodes; check its box")
 
 
 def test_a_layer_just_outside_is_reported() -> None:
@@ -292,7 +292,7 @@ def test_a_selection_without_nodes_is_reported() -> None:
     meshes = iter([structured(part.mesh) for part in case.parts])  # type: ignore[arg-type]
     with patch.object(assembly, "build_mesh", lambda *_, **__: next(meshes)):
         (warning,) = assembly.assemble(case, Path()).warnings
-    assert warning == "boundaries[0]: acts on nothing of part 'other', although it names this part"
+    assert warning == "boundaries[0]: selects no node or face of part 'other', although it names this part"
 
 
 BAR = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 2e-3], "element_size": 5e-4, "generator": "structured"}

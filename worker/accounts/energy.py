@@ -1,12 +1,13 @@
 """The energy ledger (energy balance). Every energy is in exactly one term, and the residual shows the error of the sum
 of all terms.
 
-Kinetic energy is the form that the leapfrog step conserves together with the trapezoidal work of the forces; for equal
-steps this form is 1/2 m v(n-1/2) . v(n+1/2). With the steps dt- before n and dt+ after n, seen from before n, the form
-is 1/2 m v(n-1/2) . v(n+1/2) + 1/4 (dt- - dt+) v(n-1/2) . f(n). Seen from after n the form is less by 1/4 (dt- - dt+)
-f(n) . (v(n-1/2) - v(n+1/2)). The energy that unequal steps create is an error of the method, and is added for each node
-to ``stepping`` (docs/theory/time_integration.md, Time integration). The work of the stress is computed for each tet
-from stress and strain rate, not from nodal forces, so the residual compares two independent computations.
+The kinetic energy has the form that the leapfrog step conserves together with the trapezoidal work of the forces. For
+equal steps the kinetic energy is 1/2 m v(n-1/2) . v(n+1/2). For the steps dt- before n and dt+ after n, at the end of
+the first of them, the form is 1/2 m v(n-1/2) . v(n+1/2) + 1/4 (dt- - dt+) v(n-1/2) . f(n). At the start of the second
+step the form is smaller by 1/4 (dt- - dt+) f(n) . (v(n-1/2) - v(n+1/2)). The energy that unequal time steps create is
+an error of the method. The energy created by unequal steps is added to ``stepping``, for each node
+(docs/theory/time_integration.md, Time integration). The work of the stress is computed for each tet from stress and
+strain rate, not from nodal forces, so the residual compares two independent computations.
 """
 
 from typing import Any
@@ -35,23 +36,23 @@ class Ledger:
         self.worst = 0.0
         """Largest residual of the energy ledger so far."""
         self.making = Making(sums.rounding())
-        """Energy that single terms of the ledger have created."""
+        """Energy that each term of the ledger has created."""
         self.lost = 0.0
         """Energy lost to contact (including friction) at the last call, divided by the initial energy."""
         self.residual = 0.0
-        """Residual at the last call: error of the sum of all terms, divided by the largest energy. The largest energy
-        is the maximum of the energy received so far, the work of the stress and the kinetic energy."""
+        """Residual at the last call: sum of all terms minus the initial energy and the external work, divided by the
+        largest energy. The largest energy is the maximum of the energy received so far, the work of the stress and the
+        kinetic energy."""
         self.beyond = 0.0
-        """Difference of the kinetic energy and all received energy at the last call, divided by the largest energy that
-        is also the divisor of ``residual``. If the difference is positive, the sum of all other terms of the ledger is
-        negative."""
+        """Kinetic energy minus all received energy at the last call, divided by the largest energy (see ``residual``).
+        If the difference is positive, the sum of all other terms of the ledger is negative."""
         self.unpaid = 0.0
-        """Largest decrease of the energy lost to fracture so far, divided by the energy that all broken facets absorb;
-        a decrease means that facets released more energy than they had absorbed."""
+        """Largest decrease of the energy lost to fracture so far, divided by the energy that all broken facets absorb.
+        A decrease means that facets released more energy than they had absorbed."""
         self._taken = 0.0
-        """Largest energy that was lost to fracture so far, J."""
+        """Largest value so far of the energy lost to fracture, J."""
         self.came = self.initial
-        """Largest energy that was received so far, J."""
+        """Largest value so far of the energy received, J."""
         self.momentum = np.zeros(3)
         """Linear momentum at the last call, kg m/s, including removed nodes."""
         self.angular_momentum = np.zeros(3)
@@ -59,7 +60,7 @@ class Ledger:
         self.eroded_mass = 0.0
         """Mass of removed nodes at the last call, kg."""
         self.parts: dict[str, PartEnergy] = {}
-        """Energies of each part at the last call; empty if there is one part."""
+        """Energies of each part at the last call; empty if the case has one part."""
 
     def keep(self) -> tuple[Any, ...]:
         """Return the state of the ledger for a checkpoint. All ranks return equal values."""
@@ -109,7 +110,7 @@ class Ledger:
     def _judge(self, total: float, kinetic: float, external: float, work: float) -> float:
         """Set the residual and return the largest energy, J.
 
-        ``total``: sum of the terms; ``work``: work of the stress.
+        ``total``: sum of the terms of the ledger, J; ``work``: work of the stress, J.
         """
         self.came = max(self.came, abs(external))
         scale = max(self.came, work, kinetic)
@@ -138,11 +139,13 @@ class Ledger:
         """
         limit = run.residual_limit
         for what, share in (
-            ("the kinetic energy above all energy received", self.beyond),
-            ("the energy residual", self.residual),
+            ("the kinetic energy exceeds all received energy by", self.beyond),
+            ("the energy residual is", self.residual),
         ):
             if not share <= limit:
-                raise EnergyError(f"{what}, {share:.3g}, passed run.residual_limit {limit:g} {when}")
+                raise EnergyError(
+                    f"{what} {share:.3g} of the largest energy, above run.residual_limit {limit:g}, {when}"
+                )
         self.making.require(run.made_limit, safety, when)
 
 

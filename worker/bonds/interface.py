@@ -9,8 +9,8 @@ always the mortar side. The velocities v_i of the tied side and v_j of the morta
 with the shape functions N of the mortar side, and functions psi that are dual to the shape functions of the tied side
 on every tied face (dual mortar method, Wohlmuth 2000). A constant stress is transmitted exactly, and each equation
 contains only one tied node. If the mortar side covers only a part of a tied face, each node of the tied face that lies
-on the mortar side is tied to the mortar point below it (collocation). The weight of such a node is its share of the
-covered area.
+on the mortar side is tied to the mortar point below it (collocation). The weight of a node tied by collocation is its
+share of the covered area.
 """
 
 from dataclasses import dataclass
@@ -260,8 +260,8 @@ def _missed(
         return []
     far = float(cut.distance[aside].max())
     return [
-        f"bond[{bond}]: {len(left)} nodes of {names[0]!r} are not tied: up to {far:.3g} m lie between them and "
-        f"{names[1]!r}, more than bond[{bond}].gap{_worded(limit)}"
+        f"bond[{bond}]: {len(left)} nodes of {names[0]!r} are not tied: their distance from {names[1]!r} is up to "
+        f"{far:.3g} m, more than bond[{bond}].gap{_worded(limit)}"
     ]
 
 

@@ -39,7 +39,7 @@ class Choice:
         return self._due if self._team.projecting is None else 0.0
 
     def step(self) -> str:
-        """Begin or end a measurement if this is scheduled. If fewer threads than given are used, return a message about
+        """Begin or end a measurement if its time has come. If fewer threads than given are used, return a message about
         this, once in a run.
         """
         trial, now = self._team.projecting, time.monotonic()
@@ -70,9 +70,9 @@ class Choice:
         self._reported = True
         task = made.spans[0] / made.tasks
         return (
-            f"the scene is too small for {self._team.threads} threads and uses {best}. A colour has "
-            f"{fixed(made.tasks / made.colours, 1)} tasks of {si(task, 's')}; to share a colour costs "
-            f"{si(1e-9 * made.costs.turn, 's')}, to wake a thread {si(1e-9 * made.costs.wake, 's')}"
+            f"the scene is too small for {self._team.threads} threads; the run uses {best}. A colour has "
+            f"{fixed(made.tasks / made.colours, 1)} tasks of {si(task, 's')}; the sharing of a colour "
+            f"takes {si(1e-9 * made.costs.turn, 's')}, the waking of a thread {si(1e-9 * made.costs.wake, 's')}"
         )
 
 

@@ -39,9 +39,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("conoid.worker")
 
-_WRONG_SIZE = (
-    "MPI has started {} rank(s) where {} were asked for: mpiexec or srun (--mpi=pmi2) does not fit the MPI in use"
-)
+_WRONG_SIZE = "MPI has started {} rank(s) instead of {}: mpiexec or srun (--mpi=pmi2) does not fit the MPI in use"
 
 _CODES = {
     State.SUCCEEDED: ExitCode.SUCCEEDED,
@@ -52,7 +50,7 @@ _CODES = {
 
 
 def main(arguments: list[str]) -> int:
-    """Runs one case on all ranks of MPI's world and returns the exit code of the process."""
+    """Runs one case on all ranks of MPI's world. Returns the exit code of the process."""
     began = time.monotonic()
     heap.tidy()
     options = _parse(arguments)
@@ -86,7 +84,9 @@ def _run(options: argparse.Namespace, comm: Comm, signals: Signals, began: float
 
 
 def _succeeded(folder: Path) -> bool:
-    """Returns whether the run in a folder has succeeded. The outcome of such a run must not be replaced."""
+    """Returns whether the run in a folder has succeeded. The outcome of a run that has succeeded must not be
+    replaced.
+    """
     try:
         return State(outcomes.from_json(whole.read(folder / layout.OUTCOME)).state) is State.SUCCEEDED
     except (OSError, ValueError):
@@ -109,7 +109,7 @@ def _worked(options: argparse.Namespace, comm: Comm, signals: Signals, began: fl
 
 
 def _telemetry(options: argparse.Namespace) -> "Telemetry | None":
-    """Opens the Zenoh session; only rank 0 imports Zenoh."""
+    """Opens the Zenoh session. Only rank 0 imports Zenoh."""
     if not options.telemetry:
         return None
     from ..output.telemetry import Telemetry
@@ -120,7 +120,7 @@ def _telemetry(options: argparse.Namespace) -> "Telemetry | None":
 def _outcome(
     options: argparse.Namespace, comm: Comm, journal: Journal | None, signals: Signals, began: float
 ) -> tuple[Outcome, int]:
-    """Runs the case and returns its outcome and exit code. An error of the case or of the run gives an outcome with the
+    """Runs the case. Returns its outcome and exit code. An error of the case or of the run gives an outcome with the
     state failed."""
     try:
         case, warnings = _case(options, comm)
@@ -170,7 +170,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def _case(options: argparse.Namespace, comm: Comm) -> tuple[Case, list[str]]:
-    """Returns the case with its overrides, and warnings about its text; the number of ranks in the case is set to the
+    """Returns the case with its overrides, and warnings about its text. The number of ranks in the case is set to the
     number that MPI has started.
 
     Rank 0 reads the case. All ranks receive the case, or raise the error of rank 0.
@@ -209,7 +209,9 @@ def _prepare_folder(folder: Path, comm: Comm) -> AbstractContextManager[Any] | N
     if comm.rank == 0:
         (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
         held = hold(folder)
-        if held is not None and (folder / layout.OUTCOME).exists():  # an old request to stop was for an earlier attempt
+        if (
+            held is not None and (folder / layout.OUTCOME).exists()
+        ):  # an old request to stop belongs to an earlier attempt
             (folder / layout.STOP_REQUEST).unlink(missing_ok=True)
     if not comm.broadcast(held is not None):
         return None
@@ -227,13 +229,13 @@ def _compute(
     ready_kernels(comm, journal)
     from . import compute
 
-    meshes = _file(options.case).resolve().parent  # relative paths of mesh files start at the folder of the case
+    meshes = _file(options.case).resolve().parent  # relative paths of mesh files begin at the folder of the case
     return compute.compute(case, meshes, options.out, comm, journal, signals, began, options.restart, options.use)
 
 
 def ready_kernels(comm: Comm, journal: Journal | None) -> None:
-    """Makes all ranks use the same kernels. Rank 0 hashes the sources and compiles missing kernels; the other ranks
-    wait.
+    """Ensures that all ranks use the same kernels. Rank 0 hashes the sources and compiles missing kernels; the other
+    ranks wait.
 
     The function must be called before numba is imported. Raises CompileError, StoppedError on all ranks.
     """
@@ -260,7 +262,7 @@ def _report(journal: Journal | None, what: str) -> None:
 def _close(outcome: Outcome, options: argparse.Namespace, journal: Journal, telemetry: "Telemetry | None") -> None:
     """Writes the outcome, then the last message. A reader of the last message therefore finds the outcome on disk.
 
-    For an interrupted run no last message is written here, because worker/run/job.py finds the cause of the
+    If the run was interrupted, this function writes no last message, because worker/run/job.py finds the cause of the
     interruption.
     """
     interrupted = options.interruptible and outcome.state == State.CANCELLED

@@ -1,4 +1,4 @@
-"""Reasons why a run stops before its end time, and the messages for the reasons."""
+"""Reasons why a run stops before its end time, and the message for each reason."""
 
 from conoid.cases.run import Cause, State
 
@@ -7,14 +7,14 @@ from ..simulation import Simulation
 
 CANCELLED, WALL_TIME, MAX_STEPS = 1, 2, 3
 """Numbers of the reasons for an early stop, in the reduction of the step. If ranks have different reasons, the largest
-number decides."""
+number is used."""
 
 STOPS = {
     CANCELLED: (State.CANCELLED, Cause.CANCELLED, "stopped on request"),
     WALL_TIME: (State.TIMED_OUT, Cause.WALLTIME, "run.max_wall_time is used up"),
-    MAX_STEPS: (State.TIMED_OUT, Cause.STEPS, "run.max_steps is used up before run.end_time"),
+    MAX_STEPS: (State.TIMED_OUT, Cause.STEPS, "the run reached run.max_steps before run.end_time"),
 }
-"""State, cause and message, keyed by the reason for an early stop."""
+"""Dictionary from the reason for an early stop to state, cause and message."""
 
 
 def reason(sim: Simulation, stop: int) -> str:

@@ -14,7 +14,7 @@ from .setting import velocities
 _JITTER = 0x6A697474
 """Seed of the random part of the initial velocities."""
 _ALIKE = 1e-6
-"""Ratio of the difference between two velocities to the larger velocity, below which the difference counts as
+"""Ratio of the difference between two velocities to the larger velocity. A difference with a smaller ratio counts as
 round-off. Chosen value."""
 
 
@@ -38,8 +38,8 @@ def initial_velocities(case: schema.Case, x: Floats, part: Indices, shares: Shar
 
 
 def _mean_velocities(case: schema.Case, v: Floats, x: Floats, shares: Shares) -> list[str]:
-    """Set the velocities of nodes that belong to several parts with different velocities. Return a warning if there are
-    such nodes.
+    """Set the velocities of nodes that belong to several parts with different velocities. Return a warning if nodes
+    with different velocities of their parts exist.
     """
     own = np.zeros((len(shares.node), 3))
     for index, spec in enumerate(case.parts):
@@ -52,7 +52,8 @@ def _mean_velocities(case: schema.Case, v: Floats, x: Floats, shares: Shares) ->
     v[nodes] = 0.0
     np.add.at(v, shares.node[odd], weight * own[odd])
     names = " and ".join(repr(case.parts[i].name) for i in np.unique(shares.part[odd]))
-    return [f"bond: {len(nodes)} nodes of {names} have two initial velocities; they start with the mean by mass"]
+    found = f"bond: {len(nodes)} nodes of {names} have two different initial velocities"
+    return [f"{found}; they start with the mass-weighted mean"]
 
 
 def parted(case: schema.Case, x: Floats, tets: Indices, tied: Pieces) -> list[str]:
@@ -63,8 +64,8 @@ def parted(case: schema.Case, x: Floats, tets: Indices, tied: Pieces) -> list[st
         u, v = (velocities(case.parts[i], places) for i in (one, two))
         if (most := float(np.abs(u - v).max(initial=0.0))) > _ALIKE * float(np.abs([u, v]).max(initial=0.0)):
             warnings.append(
-                f"bond[{k}]: {case.parts[one].name!r} and {case.parts[two].name!r} start at two velocities where they "
-                f"are tied, up to {most:.3g} m/s from each other: the bond takes the energy of the difference in the "
-                "first step, or breaks"
+                f"bond[{k}]: {case.parts[one].name!r} and {case.parts[two].name!r} start with different velocities at "
+                f"their bond; the difference is up to {most:.3g} m/s: in the first step the bond dissipates the energy "
+                "of this difference, or breaks"
             )
     return warnings

@@ -18,19 +18,19 @@ from ..mesh.model import TetMesh
 from ..model.state import Indices
 
 _MANY = 1_000
-"""Largest number of pieces of a part for which overlaps between the pieces are searched for; chosen value: the size of
-the table of pairs is proportional to the square of this number."""
+"""Largest number of pieces of a part for which overlaps between the pieces are searched for. Chosen value: the size of
+the table of pairs is proportional to the square of the number of pieces."""
 UNSEEN = "overlaps of bodies are checked when the run starts, because kernels are not compiled yet"
-"""Warning that overlaps are not searched for."""
+"""Warning that the run does not search for overlaps."""
 
 
 def pieces(case: Case, index: int, mesh: TetMesh, overlaps: bool) -> tuple[Indices, list[str]]:
-    """Return (nodes,) the number of the piece of each node, and warnings. All numbers are zero unless the mesh is from
-    a file and the part has contact with itself.
+    """Return (nodes,) the number of the piece of each node, and warnings. The numbers of all pieces are zero unless the
+    mesh is from a file and the part has contact with itself.
 
-    Unmerged coincident nodes, which are a common error of meshes, give a warning. ``overlaps``: whether overlaps of
-    pieces without contact are searched for. Raises InputError if such pieces have volume in common, because the mass of
-    this volume would count twice.
+    Unmerged coincident nodes, which are a common error of meshes, give a warning. ``overlaps``: True if the function
+    searches for overlaps of pieces without contact. Raises InputError if pieces without contact have volume in common,
+    because the mass of the common volume would be counted twice.
     """
     whole = np.zeros(len(mesh.points), np.int32)
     if not isinstance(case.parts[index].mesh, Measured):
@@ -62,11 +62,11 @@ def _doubled(case: Case, index: int, mesh: TetMesh, piece: Indices) -> Iterator[
         place = ", ".join(f"{c:.6g}" for c in at)
         raise InputError(
             f"parts[{index}].mesh: pieces of {case.parts[index].name!r} that share no node overlap: about "
-            f"{0.5 * volumes[tets].sum():.3g} of {volumes.sum():.3g} m^3 counts twice, for example at ({place}) m; "
-            "is an instance in the file twice?"
+            f"{0.5 * volumes[tets].sum():.3g} of {volumes.sum():.3g} m^3 are counted twice, for example at ({place}) "
+            "m; check whether the file has an instance twice"
         )
     if len(inside):
         yield (
             f"parts[{index}].mesh: {counted(len(inside), 'node')} of pieces that share no node "
-            f"{'lies' if len(inside) == 1 else 'lie'} inside of other pieces: some volume counts twice"
+            f"{'lies' if len(inside) == 1 else 'lie'} inside of other pieces: a part of the volume is counted twice"
         )

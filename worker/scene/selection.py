@@ -1,4 +1,4 @@
-"""Nodes and faces that the regions of a case select; their numbers are compared with the numbers that ``conoid
+"""Nodes and faces that the regions of a case select. Their numbers are compared with the numbers that ``conoid
 validate`` predicts.
 """
 
@@ -21,11 +21,11 @@ from .marks import Marks
 log = logging.getLogger("conoid.worker")
 
 _CLOSE = 0.5
-"""Distance outside of a region, divided by the shortest edge, within which nodes are counted to detect a layer of
-nodes; chosen value: the next layer of a regular mesh is at twice this distance."""
+"""Distance outside of a region, divided by the shortest edge. Nodes nearer to the region are counted to detect a layer
+of nodes. Chosen value: half of the distance of the next layer of a regular mesh."""
 _LAYER, _FEWEST = 0.5, 4
-"""Smallest fraction of the counted nodes within region.MOST at which these nodes count as a layer, and smallest number
-of such nodes. Chosen values: of randomly placed nodes a fifth is within that distance."""
+"""Smallest fraction of the counted nodes within region.MOST, and smallest number of these nodes, at which the nodes
+count as a layer. Chosen values: of randomly placed nodes a fifth is within that distance."""
 Members = tuple[Ints, Indices]
 """Two arrays (m,): nodes, and the parts of the nodes. A node of several parts has one entry for each of its parts
 (state.Nodes.of_parts)."""
@@ -35,8 +35,8 @@ _EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 
 @dataclass(frozen=True)
 class Nearness:
-    """Distances, m, within which nodes of each part count as lying on the border of a region
-    (``cases/shapes/region.py``).
+    """Distances, m, within which nodes count as lying on the border of a region (``cases/shapes/region.py``). Each part
+    has its own distances from the border.
     """
 
     edge: Floats
@@ -48,8 +48,8 @@ class Nearness:
 
 
 def nearness(case: schema.Case, x: Floats, members: Members, tets: Indices, tet_part: Indices) -> Nearness:
-    """Return the distances within which nodes count as lying on a border, for all parts. Arguments: nodes (n, 3), tets
-    (m, 4), and the parts of nodes and tets."""
+    """Return the distances within which nodes count as lying on a border, for all parts. Arguments: positions of the
+    nodes (n, 3), m; tets (m, 4); part of each node; and part of each tet."""
     nodes, part = members
     n = len(case.parts)
     squared, reach = np.full(n, np.inf), np.zeros(n)
@@ -65,18 +65,20 @@ def nearness(case: schema.Case, x: Floats, members: Members, tets: Indices, tet_
 
 
 def named(spec: schema.Boundary, parts: Sequence[str]) -> Flags:
-    """Return (parts,) whether a boundary names each part. A boundary that names no part has all parts."""
+    """Return (parts,) True for each part that a boundary names. If a boundary names no part, the value is True for all
+    parts.
+    """
     return np.array([not spec.parts or name in spec.parts for name in parts])
 
 
 def settled(case: schema.Case, there: Container[int]) -> list[bool]:
-    """Return for each boundary whether all its parts are in ``there``, which are numbers of parts."""
+    """Return for each boundary True if all its parts are in ``there``, a collection of part numbers."""
     return [all(index in there for index in np.flatnonzero(meant(case, spec)).tolist()) for spec in case.boundaries]
 
 
 def meant(case: schema.Case, spec: schema.Boundary) -> Flags:
-    """Return (parts,) whether each part belongs to a boundary. If the boundary is on a set and names no part, it has
-    all parts with a mesh from a file.
+    """Return (parts,) True for each part of a boundary. If the boundary is on a set and names no part, it has all parts
+    with a mesh from a file.
     """
     found = named(spec, [part.name for part in case.parts])
     if getattr(spec, "on", None) is not None and not spec.parts:
@@ -85,8 +87,8 @@ def meant(case: schema.Case, spec: schema.Boundary) -> Flags:
 
 
 def inside(spec: schema.Prescribed | schema.Traction, x: Floats, part: Indices, near: Floats) -> Flags:
-    """Return (n,) whether each point (n, 3) is in the region of a boundary; ``near``: (parts,) tolerance, m. The parts
-    of the boundary are not used.
+    """Return (n,) True for each point (n, 3) in the region of a boundary; ``near``: (parts,) tolerance, m. The parts of
+    the boundary are ignored.
     """
     return np.asarray(np.full(len(x), True) & Region.of(spec).holds(x.T, near[part]))
 
@@ -94,8 +96,8 @@ def inside(spec: schema.Prescribed | schema.Traction, x: Floats, part: Indices, 
 def held(
     spec: schema.Prescribed | schema.Traction, names: Sequence[str], x: Floats, members: Members, near: Floats
 ) -> Flags:  # fmt: skip
-    """Return (n,) whether each node (n, 3) is in the region of a boundary and belongs to one of its parts. ``names``:
-    names of the parts; ``near``: (parts,) tolerance, m.
+    """Return (n,) True for each node (n, 3) that is in the region of a boundary and belongs to one of its parts.
+    ``names``: names of the parts; ``near``: (parts,) tolerance, m.
     """
     nodes, part = members
     some = named(spec, names)[part] & inside(spec, x[nodes], part, near)
@@ -106,7 +108,7 @@ def held(
 
 @dataclass(frozen=True)
 class Selected:
-    """The nodes or faces that a boundary selects: faces of a traction and their area, m^2, or nodes of a velocity."""
+    """Nodes or faces that a boundary selects: faces of a traction and their area, m^2, or nodes of a velocity."""
 
     boundary: int
     nodes: int
@@ -115,7 +117,7 @@ class Selected:
 
 
 def compared(case: schema.Case, found: Sequence[Selected]) -> Iterator[str]:
-    """Log the selected numbers and the numbers that ``conoid validate`` predicts; yield a warning for each
+    """Log the selected numbers and the numbers that ``conoid validate`` predicts. Yield a warning for each
     difference.
     """
     expected = {load.boundary: load for load in loaded.loads(case)}
@@ -125,8 +127,8 @@ def compared(case: schema.Case, found: Sequence[Selected]) -> Iterator[str]:
         log.info("boundaries[%d] %s; expected: %s", each.boundary, took, meant)
         if not load.agrees(each.nodes, each.faces, each.area):
             yield (
-                f"boundaries[{each.boundary}]: {took}, where validate expects {meant}; check its box, its cylinder and "
-                "its parts against the mesh"
+                f"boundaries[{each.boundary}]: {took}, but `conoid validate` predicts {meant}; check its box, its "
+                "cylinder and its parts against the mesh"
             )
 
 
@@ -139,16 +141,16 @@ def _words(found: Selected) -> str:
 def missed(
     case: schema.Case, number: int, x: Floats, members: Members, near: Nearness, took: Flags
 ) -> Iterator[str]:  # fmt: skip
-    """Yield warnings for a boundary whose region selects nodes or faces of the parts ``took`` (parts,).
+    """Yield warnings about a boundary. ``took`` (parts,): parts of which its region selects nodes or faces.
 
-    A warning is given if the boundary names a part of which it selects no node; another warning is given for layers of
-    nodes that are so close to the region that the user may have meant them.
+    One warning is given if the boundary names a part of which it selects no node. Another warning is given if a layer
+    of nodes is so close to the region that the user may have meant it.
     """
     spec = case.boundaries[number]
     assert isinstance(spec, schema.Prescribed | schema.Traction)
     for name, some in zip([each.name for each in case.parts], took, strict=True):
         if name in spec.parts and not some:
-            yield f"boundaries[{number}]: acts on nothing of part {name!r}, although it names this part"
+            yield f"boundaries[{number}]: selects no node or face of part {name!r}, although it names this part"
     if spec.on is not None:
         return
     nodes, part = members
@@ -174,8 +176,8 @@ def counted(
     near: Nearness,
     marked: Marks,
 ) -> tuple[Selected, Flags]:
-    """Return the numbers that boundary ``number`` selects, and (n,) whether each node of a velocity, or (m,) each face
-    of a traction, is selected.
+    """Return the numbers that boundary ``number`` selects. Also return flags: (n,) True for each selected node of a
+    velocity, or (m,) True for each selected face of a traction.
 
     ``faces``: exposed faces (m, 3) and their parts (m,); ``marked``: sets of the nodes.
     """
@@ -198,8 +200,8 @@ def counted(
 def _cut(
     case: schema.Case, x: Floats, faces: tuple[Indices, Indices], near: Nearness, marked: Marks
 ) -> Flags:  # fmt: skip
-    """Return (m,) whether each of the exposed faces (m, 3), with their parts (m,), lies on a symmetry plane; such a
-    face is a cut through the whole body, and no traction loads it.
+    """Return (m,) True for each of the exposed faces (m, 3), with their parts (m,), that lies on a symmetry plane. A
+    face on a symmetry plane is a cut through the whole body, and no traction loads it.
     """
     (corners, of), names = faces, [each.name for each in case.parts]
     found = np.zeros(len(corners), bool)
@@ -219,8 +221,8 @@ NO_FACES = np.zeros((0, 3), np.int32), np.zeros(0, np.int32)
 def off_planes(
     case: schema.Case, x: Floats, members: Members, near: Nearness, known: Sequence[bool]
 ) -> Iterator[str]:  # fmt: skip
-    """Yield a warning for each ``known`` symmetry plane with nodes that are not on it, but so close that the user may
-    have meant them to be on it.
+    """Yield a warning for each ``known`` symmetry plane with nodes close to it. The nodes are not on the plane, but the
+    user may have meant them to be on it.
     """
     names, (nodes, part) = [each.name for each in case.parts], members
     for number, plane in case.boundaries_of(schema.Symmetry):

@@ -1,4 +1,4 @@
-"""Start of the boundary conditions. The boundary conditions change the initial velocities; contradictions between
+"""Start of the boundary conditions. The boundary conditions change the initial velocities. Contradictions between
 boundary conditions are errors.
 """
 
@@ -21,8 +21,8 @@ from . import marks, selection
 from .conditions import AXES, heights, held_by, of_parts, sides
 
 _ASIDE = 1e-9
-"""Ratio of the velocity across a symmetry plane to the largest speed, below which the velocity counts as round-off.
-Chosen value."""
+"""Ratio of the velocity across a symmetry plane to the largest speed. A velocity with a smaller ratio counts as
+round-off. Chosen value."""
 
 
 def start(
@@ -30,10 +30,10 @@ def start(
 ) -> list[str]:
     """Apply the boundaries to the initial velocities; return warnings. Collective.
 
-    ``known``: for each boundary whether all its parts are in the model; None if all are. A boundary with a missing part
-    gets fewer checks. Raises InputError on every rank for these errors: a boundary without a node, two boundaries that
-    drive a node differently, a body that starts behind a wall or through a symmetry plane, and a motion prescribed
-    across a symmetry plane.
+    ``known``: True for each boundary whose parts are all in the model; None if this is true for all boundaries. A
+    boundary with a missing part gets fewer checks. Raises InputError on every rank for these errors: a boundary without
+    a node, two boundaries that drive a node differently, a body that starts behind a wall or through a symmetry plane,
+    and a motion prescribed across a symmetry plane.
     """
     held = [held_by(case, spec, model) for spec in case.boundaries]
     known = [True] * len(held) if known is None else known
@@ -58,7 +58,7 @@ def start(
 
 
 def _beside(case: schema.Case, model: Model, comm: Comm) -> list[int]:
-    """Return the symmetry planes, with the nodes that are near each plane at the start."""
+    """Return the symmetry planes, each with the nodes that are near it at the start."""
     planes = case.boundaries_of(schema.Symmetry)
     found = comm.sum(np.array([int(np.count_nonzero(sides(case, spec, model))) for _, spec in planes], np.int64))
     return [index for (index, _), many in zip(planes, found, strict=True) if many]
@@ -72,8 +72,8 @@ def _stopped(
     across = [np.abs(nodes.v[held[index], AXES[spec.axis]]).max(initial=0.0) for index, spec in planes]
     speeds = comm.maximum(np.array([*across, np.abs(nodes.v).max(initial=0.0)]))
     return [
-        f"boundaries[{index}]: nodes start on this plane of symmetry with up to {speed:.3g} m/s across it, and are "
-        "stopped; is the motion symmetric?"
+        f"boundaries[{index}]: nodes on this plane of symmetry start with up to {speed:.3g} m/s across it; this "
+        "velocity is set to zero; check whether the motion is symmetric"
         for (index, _), speed in zip(planes, speeds[:-1], strict=True)
         if known[index] and speed > _ASIDE * speeds[-1]
     ]  # fmt: skip
@@ -89,8 +89,8 @@ def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary]
 
 
 def _refuse_crossings(case: schema.Case, model: Model, comm: Comm) -> None:
-    """Raise InputError if a tet has nodes on both sides of a symmetry plane, because the tet would overlap its own
-    mirror image.
+    """Raise InputError if a tet has nodes on both sides of a symmetry plane. A tet that crosses a symmetry plane would
+    overlap its own mirror image.
     """
     for index, spec in case.boundaries_of(schema.Symmetry):
         named, beyond = selection.named(spec, model.parts), np.zeros(len(model.parts))
@@ -128,14 +128,14 @@ def _refuse_two_drives(specs: Sequence[schema.Boundary], held: list[Flags], comm
         second, first = divmod(int(found), len(specs))
         axes = ", ".join(clash(specs[first], specs[second]))
         raise InputError(
-            f"boundaries[{second}]: drives nodes along {axes} that boundaries[{first}] drives in another way there; "
-            "give each nodes of its own"
+            f"boundaries[{second}]: drives nodes along {axes} that boundaries[{first}] drives in another way; give "
+            "each of the two boundaries its own nodes"
         )
 
 
 def _two_drives(specs: Sequence[schema.Boundary], held: list[Flags]) -> int:
     """Return a pair of boundaries that drive a node of this rank differently, as the number second * boundaries +
-    first. Return -1 if there is no such pair.
+    first. Return -1 if no two boundaries drive a node differently.
     """
     drivers = {axis: np.full(len(held[0]) if held else 0, -1) for axis in AXES}
     for second, spec in enumerate(specs):
@@ -163,8 +163,8 @@ def _refuse_conflicts(specs: Sequence[schema.Boundary], held: list[Flags], model
     for row, drive in np.argwhere(crossed):
         plane, axis = planes[row]
         raise InputError(
-            f"boundaries[{drive}]: leads nodes off their plane of symmetry, boundaries[{plane}], along {axis}; allowed "
-            "is motion along it"
+            f"boundaries[{drive}]: moves nodes off their plane of symmetry, boundaries[{plane}], along {axis}; only "
+            "motion within the plane is allowed"
         )
 
 

@@ -26,8 +26,8 @@ from ..stage import Contact
 from .overlap import to_borders
 
 SLIGHT = 0.05
-"""Ratio of the depth of a node to the typical size of a face. Depths below this ratio count as 0. Chosen value: it is
-above the residual of the contact sweeps."""
+"""Ratio of the depth of a node to the typical size of a face. A depth counts as 0 if its ratio to the size is smaller.
+Chosen value: it is above the residual of the contact sweeps."""
 _WORDS = 5
 """Number of words of a node in a message."""
 _AT_ONCE = 1 << 14
@@ -63,10 +63,10 @@ class Inside:
         """Returns a warning if a node is deeper than DEEP."""
         if not self.buried and self.deepest <= DEEP:
             return []
-        how = [f"{self.own} of them, without tets, into the part that they come from"] if self.own else []
-        how += [f"{self.buried} of them through the outermost tets"] if self.buried else []
+        how = [f"{self.own} of them, which have no tets, in the part that they come from"] if self.own else []
+        how += [f"{self.buried} of them deeper than the outermost tets"] if self.buried else []
         if self.nodes > self.buried:
-            how.append(f"{'the others ' if self.buried else ''}up to {self.deepest:.2g} of a face deep")
+            how.append(f"{'the others ' if self.buried else ''}up to {self.deepest:.2g} of the size of a face deep")
         return [
             f"{self.nodes} of {self.tested} nodes are inside of other bodies or fragments, {', '.join(how)}: "
             "compare with a finer mesh there"
@@ -114,8 +114,8 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
 
 
 def _may(contact: Contact) -> Flags:
-    """(parts, parts) True for each pair of parts that is tested. These are the pairs that may be in contact, and each
-    part of such a pair with its own nodes without tets.
+    """(parts, parts) True for each pair of parts that is tested: the pairs that may be in contact, and each part of
+    such a pair with its own nodes without tets.
     """
     meet = ~np.isnan(contact.searches.mu)
     return np.asarray(meet | (np.eye(len(meet), dtype=bool) & meet.any(axis=1)))
@@ -184,8 +184,8 @@ def _exposed(block: Block, contact: Contact) -> Flags:
 
 
 def _open(block: Block, contact: Contact, outer: Flags) -> Flags:
-    """(n, 4) True for each face of a tet that is used for depths. These are the faces that are ``_exposed``. In a tet
-    that has no such face but a corner on the surface, all faces are used."""
+    """(n, 4) True for each face of a tet that is used for depths: faces that are ``_exposed``. In a tet that has no
+    such face but a corner on the surface, all faces are used."""
     opened = _exposed(block, contact)
     touching = np.asarray(outer[block.tets].any(axis=1))
     return np.asarray(opened | (touching & ~opened.any(axis=1))[:, None])
