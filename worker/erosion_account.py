@@ -118,8 +118,8 @@ def _energies(block: Block, chosen: Ints) -> Floats:
 
 
 def _forces(block: Block, chosen: Ints, x: Floats) -> Floats:
-    """(k, 4, 3) forces of the chosen tets on their nodes, -V stress grad N, N. V is the volume, N in the gradient the
-    shape function.
+    """(k, 4, 3) forces of the chosen tets on their nodes, -V stress grad N, N. Here V is the volume of a tet, and grad
+    N the gradient of the shape function of a node.
     """
     values = _rows(block, chosen, np.arange(VISCOUS + 1))
     stress = np.empty((len(chosen), 3, 3))

@@ -31,8 +31,7 @@ from .pieces import Pieces
 from .rows import assembled
 
 _NEAR = 10.0
-"""Factor of the largest bonded distance. Nodes that are not tied are counted in a warning if their distance is smaller
-than this factor times the largest bonded distance."""
+"""Ratio of a distance to the largest bonded distance, below which nodes that are not tied are counted in a warning."""
 _COVERED = 0.95
 """Smallest fraction of the area of a tied face that must be covered by the mortar side, so that the face counts as
 covered. Chosen value: between curved surfaces, whose faces are not parallel, gaps and overlaps of 1 or 2 % of the area

@@ -34,8 +34,8 @@ _Q, _MASS, _WORK, _WORK_VISCOUS = VISCOUS * CHUNK, MASS * CHUNK, WORK * CHUNK, W
 
 @njit("UniTuple(float64, 2)(float64, float64)", cache=True, error_model="numpy")
 def _barrier(ratio, bulk):  # type: ignore[no-untyped-def]
-    """Returns the barrier pressure b and -J db/dJ, Pa. If the volume of the tet is not positive, both are zero; the
-    stable step of such a tet is NaN.
+    """Returns the barrier pressure b and -J db/dJ, Pa. If the volume of the tet is not positive, b and its derivative
+    are zero; the stable step of such a tet is NaN.
     """
     if not 0.0 < ratio < SQUEEZED:
         return 0.0, 0.0

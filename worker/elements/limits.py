@@ -33,7 +33,7 @@ def step_limit(w, s, n):  # type: ignore[no-untyped-def]
 @njit("void(float64[::1], int64)", cache=True)
 def motion_limit(w, n):  # type: ignore[no-untyped-def]
     """Raises the row LIMIT to CLOSING times the row SPEED if it is smaller. SPEED is the rate of change of the volume
-    divided by the volume, 1/s. A NaN remains NaN.
+    divided by the volume, 1/s. If the row LIMIT is NaN, it is not changed.
     """
     for i in range(n):
         rate = CLOSING * abs(w[SPEED + i])

@@ -25,8 +25,8 @@ DECLARATION = "\n@njit("
 _PROSE = re.compile(rb'"""[\s\S]*?"""|#[^\n]*')
 """Pattern of the docstrings and comments in a source file."""
 _IMPORT = re.compile(r"^from (\.+)([\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
-"""Pattern of a relative import at the top level of a source without comments; its groups are level, module and names.
-Reading the syntax trees of all sources would take six times as long."""
+"""Pattern of a relative import at the top level of a source without comments; its groups are level, module and names. A
+pattern is used because reading the syntax trees of all sources would take six times as long."""
 
 
 @cache

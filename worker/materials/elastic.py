@@ -33,7 +33,8 @@ def squeezed(s, params, i):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def turn_rate(w, n):  # type: ignore[no-untyped-def]
-    """Rotates the rate of deformation from mid-step to the end of the step, which is half of the rotation angle of Q.
+    """Rotates the rate of deformation from mid-step to the end of the step, by half of the rotation angle of the step
+    (rotation Q of ``predict``).
 
     If a is the axial vector of W dt/2, with |a| = tan(angle / 2), the axial vector for half of the angle is b = a / (1
     + sqrt(1 + a.a)).

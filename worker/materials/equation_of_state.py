@@ -124,7 +124,8 @@ def cold(params, ratio):  # type: ignore[no-untyped-def]
 @njit("float64(float64[::1], float64, float64, float64)", cache=True, error_model="numpy", forceinline=True)
 def modulus(params, ratio, tangent, pressure):  # type: ignore[no-untyped-def]
     """Returns rho c^2, Pa, with the wave speed c. The bulk modulus in this formula is at least _LEAST times the bulk
-    modulus at rest, because strong tension makes the tangent negative. A NaN remains NaN.
+    modulus at rest, because strong tension makes the tangent negative. If the tangent modulus is NaN, the result is
+    NaN.
     """
     bulk, least = ratio * (tangent + params[_GAMMA] * pressure), _LEAST * params[BULK]
     return (least if bulk < least else bulk) + 4.0 / 3.0 * params[SHEAR]

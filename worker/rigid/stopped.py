@@ -34,8 +34,8 @@ def _by_walls(case: Case, bodies: Bodies) -> Flags:
 
 
 def _by_planes(case: Case, bodies: Bodies, beside: Ints) -> Flags:
-    """Returns (2 planes, b) flags. For each symmetry plane the first row marks the bodies that start above the plane,
-    the second row those that start below.
+    """Returns (2 planes, b) flags, two rows for each symmetry plane: the first row marks the bodies that start above
+    the plane, the second row those that start below.
     """
     side = beside[:, bodies.part]
     return np.stack([side > 0, side < 0], axis=1).reshape(2 * len(case.boundaries_of(Symmetry)), bodies.n)

@@ -165,7 +165,7 @@ def _box(out, reach, lines, allowed, hull, own, some, first, stop):  # type: ign
 
 @njit(TASK, cache=True)
 def _boxes(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: runs ``_box`` for a range of primitives."""
+    """Task: computes the bounding boxes of a range of primitives (``_box``)."""
     out, reach, lines, allowed, hull, own, counts, some = _boxed(table)
     k = first // _PRIMITIVES
     counts[k] = _box(out, reach, lines, allowed, hull, own[k], some, first, stop)
@@ -173,7 +173,7 @@ def _boxes(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _pack(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """Task: copies the boxes that a task has found to their places."""
+    """Task: copies the boxes found by one task to their places in the common array."""
     out, found, begins, counts = _packed(table)
     k = first // _PRIMITIVES
     for p in range(counts[k]):
