@@ -1,6 +1,7 @@
 """Meshes of combinations of shapes, solids of CAD files and closed surfaces."""
 
 import hashlib
+from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -131,13 +132,13 @@ def joined(occ: Any, solids: Solids, key: str) -> Solids:
     """
     if len(solids) < 2:
         return solids
-    before = sum(occ.getMass(*each) for each in solids)
-    made = [each for each in occ.fragment(solids, [])[0] if each[0] == 3]
-    after = sum(occ.getMass(*each) for each in made)
-    if after < before * (1.0 - 1e-6):
-        share = (before - after) / before
-        raise MeshError(f"{key}: its solids overlap each other: {share:.2g} of their volume counts twice")
-    return made
+    whole = sum(occ.getMass(*each) for each in solids)
+    made, sources = occ.fragment(solids, [])
+    pieces = Counter(piece for source in sources for piece in source if piece[0] == 3)
+    twice = sum((count - 1) * occ.getMass(*piece) for piece, count in pieces.items() if count > 1)
+    if twice > 1e-6 * whole:
+        raise MeshError(f"{key}: its solids overlap each other: {twice / whole:.2g} of their volume counts twice")
+    return [each for each in made if each[0] == 3]
 
 
 def _refuse_too_many(gmsh: Any, solids: Solids, mesh: Meshed, frame: Frame, key: str) -> None:
