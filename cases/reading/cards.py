@@ -161,6 +161,8 @@ class Deck:
         self.followed: list[Block] = []
         """Keywords that ``blocks`` has processed itself and does not yield: ``*COMMENT``, ``*INCLUDE``, ``*PARAMETER``
         and ``*END``."""
+        self.ended = False
+        """Whether the deck itself has ``*END``; a deck without it may be cut off."""
         self._parameters: parameters.Values = {}
 
     def blocks(self) -> Iterator[Block]:
@@ -200,6 +202,7 @@ class Deck:
                 block = self._keyword(text, number, file, standing)
                 standing = block.least if block.name == "KEYWORD" else standing
                 if block.name == "END":
+                    self.ended |= not file
                     self.followed.append(block)
                     return
             elif block is not None:

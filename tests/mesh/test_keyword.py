@@ -142,8 +142,17 @@ def test_a_name_of_two_things_and_an_unknown_one_are_refused(tmp_path: Path) -> 
         volume(tmp_path, TWO + more, "middle")
 
 
+def test_a_deck_without_an_end_may_be_cut_off(tmp_path: Path) -> None:
+    for end, found in (("*END\n", False), ("", True)):
+        volume(tmp_path, TWO + end)
+        origin = taken(tmp_path / "two.key").origin
+        assert origin is not None
+        assert ("the deck has no *END: it may be cut off" in origin.notes) == found
+
+
 def test_ignored_keywords_are_reported(tmp_path: Path) -> None:
     more = "*ELEMENT_SHELL\n1,9,1,2,3,4\n*CONTACT_TIED_NODES_TO_SURFACE\n1,2\n*SET_NODE_GENERAL\n3\nBOX,1\n"
+    more += "*END\n"
     volume(tmp_path, TWO.replace("3,0,1,0\n", "3,0,1,0,7\n") + more)
     origin = taken(tmp_path / "two.key").origin
     assert origin is not None

@@ -14,6 +14,8 @@ from ..contact import part_pairs
 from ..contact.checks import overlap
 from ..errors import InputError
 from ..fracture.connectivity import components
+from ..mesh import unjoined
+from ..mesh.faces import boundary_faces
 from ..mesh.model import TetMesh
 from ..model.state import Indices
 
@@ -32,9 +34,16 @@ def pieces(case: Case, index: int, mesh: TetMesh, overlaps: bool) -> tuple[Indic
     searches for overlaps of pieces without contact. Raises InputError if pieces without contact have volume in common,
     because the mass of the common volume would be counted twice.
     """
-    whole = np.zeros(len(mesh.points), np.int32)
     if not isinstance(case.parts[index].mesh, Measured):
-        return whole, []
+        return np.zeros(len(mesh.points), np.int32), []
+    doubled = [f"parts[{index}].mesh: {note}" for note in unjoined.notes(mesh.points, boundary_faces(mesh.tets))]
+    piece, warnings = _numbered(case, index, mesh, overlaps)
+    return piece, [*warnings, *doubled]
+
+
+def _numbered(case: Case, index: int, mesh: TetMesh, overlaps: bool) -> tuple[Indices, list[str]]:
+    """Return the result of ``pieces`` for a mesh from a file, without warnings about faces."""
+    whole = np.zeros(len(mesh.points), np.int32)
     sides = np.concatenate([mesh.tets[:, [0, k]] for k in (1, 2, 3)])
     first, of = np.unique(components(len(mesh.points), sides), return_inverse=True)
     piece: Indices = np.asarray(of.reshape(-1), np.int32)

@@ -51,6 +51,8 @@ class LsDyna:
                 self._blocks.append((block, entry))
         for block in deck.followed:
             self._open(block)
+        if not deck.ended:
+            self.account.remarks.append("the deck has no *END: it may be cut off")
         self._numbered = Numbered()
         self._materials: dict[int, tuple[str, Fields, str]] = {}
         self._states: dict[int, Fields] = {}

@@ -54,7 +54,7 @@ class Deck:
         deck = cards.Deck(path)
         for block in deck.blocks():
             self._take(block)
-        self.files = deck.included.files
+        self.files, self.ended = deck.included.files, deck.ended
 
     def _take(self, block: Block) -> None:
         name, options = block.parted(_OPTIONS)

@@ -113,3 +113,5 @@ def _notes(deck: Deck, chosen: list[Cells]) -> Iterator[str]:
     if deck.held:
         yield f"constraints of nodes (TC, RC of *NODE) are ignored: {deck.held} nodes"
     yield from omitted.by_corners(chosen)
+    if not deck.ended:
+        yield "the deck has no *END: it may be cut off"
