@@ -39,8 +39,9 @@ _READING = 120
 
 _SAME = 0.02
 """Largest relative change of the volume of solids by a general transformation. In a lens of two spherical faces the
-volume was 0.31 before and 0.80 after it. OpenCASCADE integrates over splines with an error: 0.009 at most of 60 unions, differences and
-intersections of balls made at random. Chosen value: twice this error; a body above it is only read again."""
+volume was 0.31 before and 0.80 after such a transformation. OpenCASCADE integrates over splines with an error, which is
+at most 0.009 for 60 unions, differences and intersections of balls made at random. Chosen value: twice this error. The
+file of a body whose volume changes more is read again, so that its surfaces stay exact."""
 
 
 def imported(gmsh: Any, form: CadForm, path: Path, frame: Frame, head: str, *, exact: bool = False) -> Solids:
