@@ -61,5 +61,6 @@ def _on(points: Floats, faces: Ints, centres: Floats, one: Ids, other: Ids, near
     for k in range(3):
         inward = np.cross(up, corners[:, (k + 1) % 3] - corners[:, k])
         inward /= np.linalg.norm(inward, axis=1)[:, None]
-        inside &= centres @ inward.T - (corners[:, k] * inward).sum(axis=1) >= -near
+        distance = sum(centres[:, None, d] * inward[:, d] for d in range(3)) - (corners[:, k] * inward).sum(axis=1)
+        inside &= distance >= -near
     return np.concatenate([one[inside.any(axis=1)], other[inside.any(axis=0)]])
