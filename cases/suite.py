@@ -70,7 +70,7 @@ def drift(case: Case, momenta: Sequence[tuple[float, float, float]]) -> float:
 
 
 def faults(hard: Hard, outcome: Outcome, drifted: float | None) -> list[str]:
-    """Yields what is wrong with a run of the case; nothing for a correct run."""
+    """Returns one text for each error of a run of the case; empty for a correct run."""
     found = []
     if hard.refused:
         if outcome.cause != "energy" or f"the term {hard.refused} of the energy ledger" not in outcome.message:

@@ -15,7 +15,7 @@ from .errors import ClientError, UsageError
 Column: TypeAlias = "array[float] | list[str]"
 """A column: numbers as an array of doubles, or text, such as the limiter of dt, as a list."""
 _SHOWN = 5
-"""Number of rows from the beginning and from the end of a table that notebooks show. Chosen value."""
+"""Number of rows at the beginning, and number of rows at the end, of a table that notebooks show (chosen value)."""
 
 
 class Columns(dict[str, Column]):

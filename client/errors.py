@@ -24,7 +24,7 @@ from typing import Any
 from conoid.cases.reading.problems import CaseError, ConoidError, Problem
 
 _LONGEST = 1000
-"""Largest number of characters of a server's message that are shown. Chosen value: they fill half a screen."""
+"""Largest number of characters of a server's message that are shown (chosen value: they fill half a screen)."""
 
 
 class ClientError(ConoidError):
@@ -113,7 +113,7 @@ def _brief(message: object) -> str:
 
 
 def refusal(status: int, problem: Mapping[str, Any]) -> ConoidError:
-    """Returns the error for a refusal of the server. Its class is the class that the same problem has on this
+    """Returns the error for a refusal of the server. The error has the class that the same problem has on this
     machine.
     """
     errors = problem.get("errors")

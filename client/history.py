@@ -14,7 +14,7 @@ from .columns import Columns, read_columns
 from .errors import ClientError, UnfinishedError
 
 _ROUNDING = 1e-9
-"""Relative tolerance for the comparison of the last time of the history with the end of the run."""
+"""Relative difference up to which the last time of the history counts as equal to the end time of the run."""
 
 
 def read_history(text: str, name: str, outcome: Callable[[], Outcome]) -> Columns:

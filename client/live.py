@@ -9,11 +9,11 @@ from conoid.cases.messages import AnyMessage, Counts, Finished, Frame, Load, Log
 from conoid.cases.run import Cause, ExitCode, State
 
 DESCHEDULED = "descheduled"
-"""Wall time without CPU time: the rank was not scheduled by the operating system, or slept."""
+"""Name of the wall time in which a rank used no CPU time: the operating system did not schedule it, or it slept."""
 PHASE_GROUPS = ("compute", "contact", "exchange", "output", "wait", DESCHEDULED)
 _IDLE = "exchange", "wait", DESCHEDULED
 _LOG_TAIL = 200
-"""Number of log messages that are kept for display. Chosen value: they fill several screens."""
+"""Number of log messages that are kept for display (chosen value: they fill several screens)."""
 
 
 @dataclass
@@ -117,8 +117,8 @@ class Live:
 
     @property
     def busy(self) -> list[float]:
-        """Fraction of the last interval between Load messages in which each rank computed. Message exchange, waiting
-        and descheduled time are not included.
+        """Fraction of the time between the last two Load messages in which each rank computed. Message exchange,
+        waiting and descheduled time are not included.
         """
         totals = [sum(seconds) for seconds in zip(*self.phases.values(), strict=True)]
         idle = [sum(self.phases[name][rank] for name in _IDLE if name in self.phases) for rank in range(len(totals))]
@@ -128,9 +128,9 @@ class Live:
 def grouped(
     phases: dict[str, list[float]], interval: float = 0.0, waiting: Sequence[float] = ()
 ) -> dict[str, list[float]]:
-    """Sums the phases of the worker into PHASE_GROUPS, in the same way as the page: ``elements``, ``nodes`` and
-    others are compute. ``waiting``: part of the exchange in which a rank waits for other ranks. In the rest of the
-    ``interval``, s, the rank had no core or slept.
+    """Sums the phases of the worker into PHASE_GROUPS, in the same way as the page: ``elements``, ``nodes`` and others
+    are compute. ``waiting``: part of the exchange in which a rank waits for other ranks. In the rest of the
+    ``interval`` between two Load messages, s, the rank had no core or slept.
     """
     sums: dict[str, list[float]] = {}
     for name, seconds in phases.items():

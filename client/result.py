@@ -32,8 +32,8 @@ from .reports import html
 
 _TABLE = re.compile(rf"{fragments.FOLDER}/fragments_(\d+)\.csv")
 _BEYOND = 0.01
-"""Fraction of the simulated time from the first to the last frame by which a requested time may lie outside. Chosen
-value: a run ends within one step of its end time."""
+"""Fraction of the simulated time from the first to the last frame by which a requested time may lie outside (chosen
+value: a run ends within one step of its end time)."""
 
 
 class _Part(msgspec.Struct):
@@ -151,8 +151,9 @@ class Result:
         return sorted(int(found[1]) for name in self.folder.names() if (found := _TABLE.fullmatch(name)))
 
     def fragments_of(self, index: int = -1) -> Columns:
-        """Returns the table of fragments of a frame (-1: the last frame). Raises UnfinishedError if the frame has "
-        "none."""
+        """Returns the table of fragments of a frame (-1: the last frame). Raises UnfinishedError if the frame has no
+        table.
+        """
         known = self.fragment_tables
         if not known or (index != -1 and index not in known):
             wanted = "any frame" if index == -1 else f"frame {index}"

@@ -26,11 +26,11 @@ from .result import Result
 from .snapshots import Snapshot
 
 _WAIT = 20.0
-"""Time limit of one request that waits for the end of a run, s. It is below the 30 s after which a request is given
-up (http.py)."""
+"""Time limit of one request that waits for the end of a run, s. This limit is below the 30 s after which a request is
+given up (http.py)."""
 _PATIENCE = 120.0
-"""Time without an answer of the server, s, after which waiting for a run ends. Chosen value: twice the time of a
-restart."""
+"""Time without an answer of the server, s, after which waiting for a run ends (chosen value: twice the time of a
+restart)."""
 
 
 @dataclass
@@ -136,8 +136,8 @@ class Run:
         return watch(self, live)
 
     def history(self, points: int = 1000) -> dict[str, Any]:
-        """Returns the history of the run with at most ``points`` reports. Its keys are ``series``, ``ranks``,
-        ``balance``, ``snapshots``, ``last``.
+        """Returns the history of the run with at most ``points`` reports. The keys of the history are ``series``,
+        ``ranks``, ``balance``, ``snapshots``, ``last``.
         """
         return self.session.get(dict[str, Any], f"{self.path}/history", points=points)
 
@@ -202,8 +202,8 @@ class Run:
         return target
 
     def _address(self, file: FileInfo) -> str:
-        """Returns the address of a file. It is the address in the list if that belongs to the run; else it is made
-        from the path.
+        """Returns the address of a file. The address is that in the list if it belongs to the run; else the address is
+        made from the path.
         """
         own = f"{self.path}/files/"
         return file.url if file.url.startswith(own) else f"{own}{quoted(file.path, safe='/')}"

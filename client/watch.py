@@ -21,8 +21,8 @@ from .live import Live
 from .remote.link import Link
 
 REASON_EVERY = 3.0
-"""Time between two requests for the reason why a queued run waits, s. Chosen value: below the 8 s after which a
-progress line is printed."""
+"""Time between two requests for the reason why a queued run waits, s (chosen value: below the 8 s after which a
+progress line is printed)."""
 
 
 class Titled(Protocol):

@@ -47,7 +47,7 @@ Read = TypeVar("Read", bound=BaseModel)
 
 
 def check(case: Case) -> list[Problem]:
-    """Yields every problem between keys of a case, in the order of the keys."""
+    """Returns every problem that involves several keys of a case, in the order of the keys."""
     checks: tuple[Callable[[Case], Iterable[Problem]], ...] = (
         _materials, _parts, _overlaps, _sectors, check_boundaries, check_ons, check_walls, check_bonds, check_rigid,
         _contact, check_probes, _fields, _references,

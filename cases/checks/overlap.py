@@ -129,8 +129,8 @@ def _common(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> tuple[V
 
 
 def _round(point: Vector, margin: float) -> Iterator[Vector]:
-    """Returns six points around a point. Where turned bodies touch, rounding can put the point itself inside both
-    bodies; the six points around it are then not all inside.
+    """Yields six points around ``point``, each at the distance ``margin``, m. Where turned bodies touch, rounding can
+    put the point itself inside both bodies; the six points around it are then not all inside.
     """
     x, y, z = point
     for off in (-margin, margin):

@@ -36,9 +36,9 @@ def core_numbers() -> list[int]:
 
 
 def _quotas(groups: Path, own: Path) -> list[float]:
-    """Yields the CPU quota, in cores, of each control group of a process that has a quota: from cpu.max in version 2 of
-    control groups, from cpu.cfs_quota_us in version 1. The root group is included, because inside of a container it is
-    the group of the container.
+    """Returns the CPU quota, in cores, of each control group of a process that has a quota: from cpu.max in version 2
+    of control groups, from cpu.cfs_quota_us in version 1. The root group is included, because inside of a container it
+    is the group of the container.
     """
     found = []
     for line in _text(own).splitlines():

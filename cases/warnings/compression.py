@@ -94,7 +94,7 @@ def crushed(case: Case) -> Iterator[Problem]:
 
 
 def borne(found: Sequence[Compressed]) -> list[str]:
-    """Yields a warning for each part that was compressed beyond Griffith's criterion in a run."""
+    """Returns a warning for each part that was compressed beyond Griffith's criterion in a run."""
     return [
         f"{each.part} was compressed to {si(each.most, 'Pa')}, with {si(each.least, 'Pa')} across it, "
         f"{each.times:.2g} times the limit for its tensile strength (Griffith 1924), in tet {each.tet} at "

@@ -61,12 +61,14 @@ metres (reason of the chosen value)."""
 
 
 def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Problem]:
-    """Yields every warning. ``data``: the case as it was written; ``expected``: the estimate of the case."""
+    """Returns every warning about a case. ``data``: the case as it was written; ``expected``: the estimate of the
+    case.
+    """
     return [*bare_numbers(data), *oddities(case, expected)]
 
 
 def oddities(case: Case, expected: Estimate) -> list[Problem]:
-    """Yields the warnings that do not depend on how the case is written."""
+    """Returns the warnings that do not depend on how the case is written."""
     return [
         *_effort(case, expected),
         *_materials(case),
@@ -91,7 +93,7 @@ def oddities(case: Case, expected: Estimate) -> list[Problem]:
 
 
 def bare_numbers(data: Mapping[str, Any]) -> list[Problem]:
-    """Yields a warning for each key that has a number other than 0 without a unit. The warning gives the unit that is
+    """Returns a warning for each key that has a number other than 0 without a unit. The warning gives the unit that is
     assumed.
     """
     whole = shipped_schema()

@@ -23,7 +23,7 @@ def warned(case: Case, expected: Estimate, survey: Survey, touches: Iterable[Tou
 
 
 def _notes(case: Case, survey: Survey) -> list[Problem]:
-    """Yields the notes of the survey on contents of mesh files that are not used."""
+    """Returns the notes of the survey on contents of mesh files that are not used."""
     return [
         problem(("parts", each.part, "mesh", "path"), getattr(case.parts[each.part].mesh, "path", ...), note)
         for each in survey.parts

@@ -1,6 +1,4 @@
-"""The command ``conoid sweep --adaptive``: it reads the goal from the arguments and prints the result as lines or
-JSON.
-"""
+"""The command ``conoid sweep --adaptive``: reads the goal from the arguments and prints the result as lines or JSON."""
 
 import hashlib
 from collections.abc import Sequence

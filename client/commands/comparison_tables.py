@@ -8,12 +8,12 @@ from ..reports.compare import AT_THE_END, Comparison
 from .tables import pairs, table
 
 _LONGEST = 60
-"""Largest number of characters of a value that are shown. Chosen value: the values of two runs fit side by side;
-some values, such as descriptions, are longer."""
+"""Largest number of characters of a value that are shown (chosen value: the values of two runs fit side by side; some
+values, such as descriptions, are longer)."""
 _NUMBERS = ("A", "B", "B - A", "% of A")
 _LEAST = 26
-"""Smallest number of characters of the column of names. Chosen value: most names fit, and a table line has 80
-characters."""
+"""Smallest number of characters of the column of names (chosen value: most names fit, and a table line has 80
+characters)."""
 
 
 def _brief(text: str) -> str:

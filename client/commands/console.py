@@ -1,9 +1,9 @@
 """Output to the terminal. All commands print through this module only.
 
-A title, a file name or an answer of a server may contain any character. An escape sequence could rename a window,
-write to the clipboard or overwrite text of the terminal. Some characters reverse the direction of text, or have no
-width, and could hide text. All these characters are printed as escapes such as ``\\u001b``, which are also valid
-JSON.
+A title, a file name or an answer of a server may contain characters that control the terminal. An escape sequence could
+rename a window, write to the clipboard or overwrite text of the terminal. Some characters reverse the direction of
+text, or have no width, and could hide text. All these characters are printed as escapes such as ``\\u001b``, which are
+also valid JSON.
 """
 
 import json

@@ -31,8 +31,8 @@ from .options import CaseArgument, Overrides, Token, Url, aloud, complain
 from .reports import drawing
 
 _ENSEMBLE = 5
-"""Number of runs in the ensemble of each point if the case has fracture. Chosen value: the standard deviation of
-five runs has an uncertainty of about a third."""
+"""Number of runs in the ensemble of each point if the case has fracture (chosen value: the standard deviation of five
+runs has an uncertainty of about a third)."""
 
 
 def converge(

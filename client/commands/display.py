@@ -31,24 +31,24 @@ _PHASE_STYLE = {
 }
 _LEVEL_STYLE = {"warning": "yellow", "error": "red"}
 _MOST_RANKS = 12
-"""Largest number of ranks with a bar in the panel. Chosen value: a terminal has no space for more bars."""
+"""Largest number of ranks with a bar in the panel (chosen value: a terminal has no space for more bars)."""
 _BAR = 36
-"""Largest length of a bar in characters. Chosen value for a terminal of 80 columns."""
+"""Largest length of a bar in characters (chosen value for a terminal of 80 columns)."""
 _FRAME = 4
-"""Number of characters that the border takes from each text line."""
+"""Number of characters of each line of the panel that its border takes."""
 _APART = 2
 """Number of blanks between two columns."""
 _DETAILS = (_MOST_RANKS, 6, True), (4, 3, True), (2, 2, True), (2, 2, False), (1, 1, False)
-"""Layouts of the panel from large to small: number of ranks, number of lines of the log, whether energy terms are
-shown. The first layout that fits the height of the terminal is used."""
+"""Layouts of the panel from large to small. Each layout has the number of ranks with a bar, the number of lines of the
+log, and whether energy terms are shown. The first layout that fits the height of the terminal is used."""
 _SMALL = 0.005
-"""Fraction of the total energy below which energy terms share one text line. Chosen value: the bar of such a term
-would have no length."""
+"""Fraction of the total energy below which energy terms share one text line (chosen value: the bar of such a term would
+have no length)."""
 Pair = tuple[str, str]
 
 
 class panel:  # noqa: N801
-    """The panel of a run, drawn by rich.live with the width and height of the terminal."""
+    """The panel with the progress of a run; rich.live draws it with the width and height of the terminal."""
 
     def __init__(self, live: Live, log_lines: int = 6) -> None:
         """``log_lines``: largest number of lines of the log in the panel."""
@@ -78,7 +78,7 @@ class panel:  # noqa: N801
 
 
 def _under(live: Live) -> str | None:
-    """Returns the names of the run and of its subscription, for the line below the panel."""
+    """Returns the name of the run and the name of its subscription, for the line below the panel."""
     return " ".join([*([live.run] if live.title else []), *([f"over {live.link}"] if live.link else [])]) or None
 
 
@@ -198,7 +198,7 @@ def _flow(items: list[Text], width: int) -> list[Text]:
 
 
 def _helped(live: Live, rank: int) -> str:
-    """Returns the CPU load of the threads of a rank without its first thread."""
+    """Returns the CPU load of the threads of a rank, except its first thread, as text."""
     return f", its threads {percent(live.helped[rank], 0)}" if rank < len(live.helped) else ""
 
 

@@ -86,8 +86,8 @@ def hard(
 
 
 def chosen(known: Sequence[Hard], words: Sequence[str]) -> list[Hard]:
-    """Returns the cases with the given names or catalogue rows; all cases without arguments. Raises ClientError if a
-    word is unknown.
+    """Returns the cases with the given names or rows of the catalogue; without arguments, all cases. Raises ClientError
+    if a word is unknown.
     """
     for word in words:
         if not any(word == each.name or word in each.rows for each in known):

@@ -79,7 +79,7 @@ class Grouped(TyperGroup):
                     formatter.write_dl(rows)  # type: ignore[attr-defined]
 
     def get_command(self, ctx: typer.Context, cmd_name: str) -> TyperCommand | None:  # type: ignore[override]
-        """Writes the help of a command with its examples."""
+        """Returns a command whose help ends with its examples."""
         command = super().get_command(ctx, cmd_name)
         if command is not None and cmd_name in EXAMPLES and not command.epilog:
             lines = "\n".join(f"  {line}" for line in EXAMPLES[cmd_name])

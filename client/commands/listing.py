@@ -14,7 +14,7 @@ from .options import Json, Labels, Token, Url, labels_of, show_lines
 from .times import moment
 
 _VALUES = 4
-"""Largest number of values of the case that are shown for a run. Chosen value: as many as fit into a text line."""
+"""Largest number of values of the case that are shown for a run (chosen value: as many as fit into a text line)."""
 
 
 Words = Annotated[
@@ -45,7 +45,7 @@ def runs(
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """List runs, newest first, with the values of their cases that differ.
+    """List runs, newest first, with those values of their cases that differ between the runs.
 
     The list shows short ids: the shortest unique prefix of each id. Every command accepts such a prefix.
     """

@@ -27,13 +27,14 @@ from . import progress
 from .console import PlainConsole, echo, one_line
 
 _MOST_WARNINGS = 12
-"""Largest number of warnings that are printed. Chosen value: they fill half a screen."""
+"""Largest number of warnings that are printed (chosen value: they fill half a screen)."""
 
 _RARER = 1.2
-"""Growth factor of the time between two progress lines. Chosen value: a command of one day prints about forty lines."""
+"""Factor by which the time between two progress lines grows from line to line (chosen value: a command of one day
+prints about forty lines)."""
 
 _NO_WIDTH = 1000
-"""Width of a text line in a file or a pipe, characters. Chosen value: wider than any table."""
+"""Width of a text line in a file or a pipe, characters (chosen value: wider than any table)."""
 
 FILE_OPTIONS = ("--out", "--view", "--list", "--runs", "--site")
 """Options whose value is the name of a file or a folder."""
@@ -182,8 +183,8 @@ def show_lines(rows: RenderableType) -> None:
 
 @contextmanager
 def aloud(what: str) -> Iterator[Callable[[str], None]]:
-    """Context that prints progress lines with ``what`` while the code inside takes long; the lines become rarer with
-    time.
+    """Prints progress lines with the text ``what`` while the code inside of the ``with`` block takes long; the lines
+    become rarer with time.
     """
     at, began, due = what, time.monotonic(), 0.0
 
@@ -213,7 +214,7 @@ def find(session: Session, run: str) -> Run:
 
 @contextmanager
 def opened(source: str, url: str | None, token: str | None) -> Iterator[Result]:
-    """Context with the result of a run; ``source``: id or folder of the run."""
+    """Yields the result of a run for a ``with`` block; ``source``: id or folder of the run."""
     if (folder := folder_of(source)) is not None:
         yield Result.open(folder)
         return

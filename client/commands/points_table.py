@@ -15,8 +15,8 @@ from .sweep_columns import Row, number_of, telling
 from .tables import short_names, table
 
 _MOST = 4
-"""Number of result columns that are shown by default. Chosen value: keys, state and these results fit into 80
-characters."""
+"""Number of result columns that are shown by default (chosen value: keys, state and these results fit into 80
+characters)."""
 
 
 def narrowed(text: str, keys: Sequence[str], columns: Sequence[str]) -> str:
@@ -36,8 +36,8 @@ def narrowed(text: str, keys: Sequence[str], columns: Sequence[str]) -> str:
 
 
 def table_of(rows: Sequence[Row], keys: Sequence[str], *, whole: bool) -> Table | Group:
-    """Returns a table of keys, state and results. With ``whole`` all results are shown; otherwise the most
-    informative results, and the number of further results that differ.
+    """Returns a table of keys, state and results. With ``whole`` the table shows all results. Otherwise it shows the
+    most informative results, and below them the number of further results that differ between the points.
     """
     titles = list(rows[0]) if rows else []
     changed = [title for title in titles if split(title)[0] in keys]

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 LONGEST = 8.0
 """Time without output, s, after which a progress line is printed."""
 _RARER = 1.2
-"""Growth factor of the time between two progress lines. Chosen value: a command of one day prints about forty lines."""
+"""Factor by which the time between two progress lines grows from line to line (chosen value: a command of one day
+prints about forty lines)."""
 _LOOK = 0.125
 """Time between two checks by the thread, as a fraction of ``LONGEST``."""
 
@@ -16,7 +17,7 @@ _LOOK = 0.125
 @contextmanager
 def broken(write: Callable[[str], None], words: Callable[[], str]) -> Iterator[Callable[[str], None]]:
     """Context in which the caller prints lines with ``write``. After ``LONGEST`` s without a line a thread prints
-    ``words()``. It prints ``words()`` again each time that the silent time has grown by a fifth.
+    ``words()``. The thread prints ``words()`` again each time that the silent time has grown by a fifth.
     """
     last, spoken, over = time.monotonic(), 0.0, threading.Event()
 

@@ -135,8 +135,8 @@ def _report(result: Result, outcome: Outcome, printed: set[str], out: Console) -
 
 
 def _telling_field(case: Case) -> str:
-    """Returns the field of the picture: fragments if a part can break, plastic strain if a part can yield, else the
-    stress.
+    """Returns the field that the picture shows: fragments if a part can break, plastic strain if a part can yield, else
+    the von Mises stress.
     """
     if case.fractures:
         return "fragment"

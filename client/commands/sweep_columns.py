@@ -35,8 +35,8 @@ def known(rows: Sequence[Row], name: str) -> str:
 
 
 def telling(rows: Sequence[Row], titles: Sequence[str]) -> list[str]:
-    """Returns the titles of the numeric columns with values that differ between the points; the most informative
-    columns are first.
+    """Returns the titles of the numeric columns whose values differ between the points, the most informative columns
+    first.
     """
 
     def differs(name: str) -> bool:

@@ -43,8 +43,8 @@ from .display import STATE_STYLE
 
 
 def table(*columns: str, right: Sequence[str] = (), wide: Sequence[str] = ("case",), least: int | None = None) -> Table:
-    """Returns a table without borders. Columns in ``right`` are aligned to the right. Columns in ``wide`` are
-    wrapped if necessary; the first of these columns has at least ``least`` characters.
+    """Returns a table without borders. Columns in ``right`` are aligned to the right. The texts of the columns in
+    ``wide`` are wrapped if necessary; the first column in ``wide`` has at least ``least`` characters.
     """
     made = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
     for column in columns:
@@ -216,7 +216,9 @@ def outcome_table(outcome: Outcome, printed: Collection[str] = ()) -> Table:
 
 
 def _a_step(outcome: Outcome) -> str:
-    """Returns the serial and the parallel fraction of a step, for the rank with the longest serial part."""
+    """Returns a text with the serial and the parallel wall time of a time step, for the rank with the longest serial
+    time.
+    """
     alone, steps = [sum(each) for each in zip(*outcome.serial.values(), strict=True)], outcome.steps
     if not alone or not steps:
         return ""

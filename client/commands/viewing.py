@@ -18,8 +18,8 @@ from .console import echo, echo_json
 from .options import Json, Token, Url, aloud, complain, find
 
 _NEAR = 0.005
-"""Relative difference between the requested and the drawn time below which no note is printed. Chosen value: times
-are shown with three digits."""
+"""Largest relative difference between the requested time and the time of the drawn frame for which no note is printed
+(chosen value: times are shown with three digits)."""
 
 
 def view_frames(

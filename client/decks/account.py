@@ -11,13 +11,14 @@ from conoid.cases.reading.included import Line
 T = TypeVar("T")
 Fate = Literal["taken", "left", "refused"]
 Remark = Literal["left", "differs", "refused"]
-"""Fate of a field of a translated keyword: omitted without effect, with a different meaning in Conoid, or not
-translated although the answer needs it."""
+"""Result of the import for a field of a translated keyword: ``left``: omitted without effect on the answer;
+``differs``: translated with a different meaning in Conoid; ``refused``: not translated although the answer depends on
+it."""
 
 
 @dataclass(frozen=True)
 class Detail:
-    """A field of a keyword that was omitted, changed its meaning, or refuses the import."""
+    """A field of a keyword that was omitted, has a different meaning in Conoid, or is a reason to refuse the import."""
 
     kind: Remark
     what: str
@@ -42,7 +43,7 @@ class Entry:
 
     @property
     def fate(self) -> Fate:
-        """Fate of the keyword: translated, omitted, or a reason to refuse the import."""
+        """Result of the import for the keyword: it was translated, omitted, or a reason to refuse the import."""
         if self.barred:
             return "refused"
         return "taken" if self.places else "left"
@@ -66,7 +67,7 @@ class Entry:
         self.reasons.append(why)
 
     def remark(self, kind: Remark, what: str, why: str) -> None:
-        """Records the fate of a field of the keyword."""
+        """Records what the import did with a field of the keyword."""
         detail = Detail(kind, what, why)
         if detail not in self.details:
             self.details.append(detail)
@@ -77,7 +78,7 @@ class Entry:
         return f"line {self.line} of {self.file}" if self.file else f"line {self.line}"
 
     def refusals(self) -> Iterator[str]:
-        """Returns the reasons for which the keyword refuses the import, one text line each."""
+        """Yields the reasons for which the keyword refuses the import, one text line each."""
         if self.barred:
             yield f"{self.place}, {self.keyword}: {'; '.join(self.reasons)}"
         for each in self.details:
@@ -115,7 +116,7 @@ class Account:
             self.open(keyword, int(line), line.file).leave("the included file is read as a part of the deck")
 
     def close(self) -> None:
-        """Refuses the import for keywords whose fate is still undecided."""
+        """Refuses the import because of each keyword that was neither translated nor omitted."""
         for each in self.entries:
             if not each.decided:
                 each.refuse("unknown keyword, which may change the result")
@@ -130,7 +131,7 @@ class Account:
             )
 
     def of(self, fate: Fate) -> list[Entry]:
-        """Returns the entries with a given fate."""
+        """Returns the entries of the keywords that were translated, omitted or refused (``fate``)."""
         return [each for each in self.entries if each.fate == fate]
 
     def refusals(self) -> list[str]:

@@ -21,8 +21,8 @@ from .toml import NOTE
 
 _FORMATS = ", ".join(DIALECTS)
 _SHOWN = 20
-"""Number of reasons of a refusal that are printed. Chosen value: they fit on a screen; the account file has all
-reasons."""
+"""Number of reasons of a refusal that are printed (chosen value: they fit on a screen; the account file has all
+reasons)."""
 
 
 def import_deck(

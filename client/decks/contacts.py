@@ -78,7 +78,7 @@ def _frictions(meetings: Sequence[Meeting]) -> dict[tuple[str, str], float]:
 def _more(
     meetings: Sequence[Meeting], met: dict[tuple[str, str], float], inside: list[str], names: dict[str, str]
 ) -> None:
-    """Adds a note on pairs of bodies that are in contact in the case but not in the deck."""
+    """Adds a remark to the account about pairs of bodies that are in contact in the case but not in the deck."""
     extra = [(a, b) for a, b in itertools.combinations(sorted(inside), 2) if (a, b) not in met]
     if extra:
         shown = ", ".join(f"{names[a]} and {names[b]}" for a, b in extra[:3]) + (" ..." if len(extra) > 3 else "")

@@ -18,8 +18,8 @@ from .radioss.reading import Radioss
 from .units import System, Weighed
 
 _LOOKED = 2000
-"""Number of lines at the start of a file that are searched. Chosen value: longer than the comments at the top of any
-deck."""
+"""Number of lines at the start of a file that are searched (chosen value: longer than the comments at the top of any
+deck)."""
 
 
 class Dialect(Protocol):

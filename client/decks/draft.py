@@ -12,7 +12,7 @@ from .toml import NOTE
 from .units import LENGTH, Dimension, System
 
 _MOST_FRAMES = 100_000
-"""Largest number of parts of a case (cases/model/schema.py)."""
+"""Largest number of frames of a run (cases/model/run.py)."""
 
 
 @dataclass

@@ -15,8 +15,8 @@ AXES = ("x", "y", "z")
 Course = tuple[tuple[float, float], ...]
 """Points of a function of time: time in the unit of the deck, and factor."""
 _NEAR = 1e-6
-"""Tolerance for nodes on one plane, relative to the size of a body. Chosen value: above the rounding of files with
-six digits, far below the size of any tet."""
+"""Tolerance for nodes on one plane, relative to the size of a body (chosen value: above the rounding of files with six
+digits, far below the size of any tet)."""
 
 
 @dataclass
@@ -102,8 +102,8 @@ class Holding:
             each.open.discard(axis)
 
     def _plane(self, axis: str, key: str, held: set[int]) -> float | None:
-        """Returns the coordinate of the plane of the restrained nodes ``held`` of a body. The result is None unless
-        these are all nodes of one plane at an end of the body.
+        """Returns the coordinate of the plane of the restrained nodes ``held`` of a body. The function returns None
+        unless these are all nodes of one plane at an end of the body.
         """
         d, mine = AXES.index(axis), self._topology.of[key] & held
         if not mine:
@@ -159,8 +159,8 @@ def _shown(axes: set[str]) -> str:
 
 
 def velocity_course(curve: Course, end: float) -> tuple[float, Course]:
-    """Returns the largest prescribed velocity and its factors over time (course). Raises ValueError if the curve is
-    empty or too short.
+    """Returns the largest magnitude of a prescribed velocity, and the velocity divided by it over time (course). Raises
+    ValueError if the curve is empty or too short.
     """
     if not curve:
         raise ValueError("the curve has no points")

@@ -5,8 +5,8 @@ from fractions import Fraction
 from itertools import pairwise
 
 _STRAIGHT = 1e-6
-"""Largest deviation of points from a straight line, relative to the largest stress. Chosen value: above the rounding
-of decks with six digits."""
+"""Largest deviation of points from a straight line, relative to the largest stress (chosen value: above the rounding of
+decks with six digits)."""
 
 
 def young_of(bulk: float, shear: float) -> tuple[float, float]:
@@ -36,8 +36,8 @@ def hardening_of(young: float, tangent: float) -> float:
 
 
 def line_of(points: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
-    """Returns yield stress and hardening of (plastic strain, stress) points; None unless all points lie on one
-    straight line that begins at strain 0. One single point means a constant flow stress.
+    """Returns yield stress and hardening modulus of a curve of points (plastic strain, stress); None unless all points
+    lie on one straight line that begins at strain 0. One single point means a constant flow stress.
     """
     if not points or points[0][0] != 0.0 or any(a[0] >= b[0] for a, b in pairwise(points)):
         return None

@@ -17,8 +17,8 @@ class Names:
         self._taken: set[str] = set()
 
     def give(self, wanted: str, kind: str, number: object = "") -> str:
-        """Returns a valid name close to ``wanted``; the name is made of ``kind`` and ``number`` if no character of
-        ``wanted`` is valid.
+        """Returns a valid name similar to ``wanted``. If no character of ``wanted`` is valid, the name consists of
+        ``kind`` and ``number``.
         """
         plain = wanted if name(wanted)[:1] == wanted.strip()[:1] else f"{kind}_{wanted or number}"
         base = name(plain) or kind

@@ -23,7 +23,7 @@ class Start:
     """Rotation vector in radians per unit of time of the deck."""
     centre: Point = (0.0, 0.0, 0.0)
     rank: int = 0
-    """A velocity of higher rank replaces those of lower rank, also if it is earlier in the deck."""
+    """Priority of the velocity: it replaces velocities of a lower rank, also those further down in the deck."""
 
 
 def begin(draft: Draft, topology: Topology, bodies: Sequence[Body], starts: Sequence[Start]) -> None:

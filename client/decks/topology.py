@@ -1,5 +1,5 @@
-"""Nodes of the parts of a deck and their positions. They are read only if a keyword needs the common nodes of
-bodies.
+"""Nodes of the parts of a deck and their positions. Nodes and positions are read only if a keyword needs the common
+nodes of bodies.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -32,9 +32,9 @@ class Topology:
         nodes: Callable[[], Mapping[str, set[int]]],
         points: Callable[[], Mapping[int, Point]],
     ) -> None:
-        """``bodies``: keys of the parts that become parts of the case. ``nodes``: function that reads the nodes of
-        each part. ``points``: function that reads the positions of nodes, in the unit of the deck. Both functions
-        are called at the first use.
+        """``bodies``: keys of the parts that become parts of the case. ``nodes``: function that reads the nodes of each
+        part. ``points``: function that reads the positions of nodes, in the unit of the deck. The functions ``nodes``
+        and ``points`` are called when their results are used first.
         """
         self.bodies = list(bodies)
         self._read_nodes, self._read_points = nodes, points

@@ -17,7 +17,7 @@ class Stop:
     table: dict[str, Any]
     entry: Entry
     more: list[Entry] = field(default_factory=list)
-    """Further keywords that were translated into the table."""
+    """Further keywords that were translated into the table of this wall."""
 
 
 def stand(draft: Draft, topology: Topology, bodies: Sequence[Body], stops: Sequence[Stop]) -> list[tuple[str, ...]]:

@@ -12,9 +12,9 @@ from .camera import Camera
 from .shot import Shot
 
 _ACROSS = 22
-"""Number of arrows along the longer side of a panel. Chosen value."""
+"""Number of arrows along the longer side of a panel (chosen value)."""
 _LONGEST = 1.8
-"""Length of the longest arrow, relative to the distance between two arrows. Chosen value."""
+"""Length of the longest arrow, divided by the distance between two arrows (chosen value)."""
 
 
 def longest(shots: Sequence[Shot]) -> float:

@@ -18,20 +18,20 @@ from .picture import Picture
 Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 
 FROM = (1.0, -1.55, 0.62)
-"""Default direction from the body to the camera: from the front, the right and above. Chosen value."""
+"""Default direction from the body to the camera: from the front, the right and above (chosen value)."""
 _ASIDE = 1.55
 """Component of the direction to the camera along the normal of a plane of symmetry; the components along other sides
-are 1. Chosen value."""
+are 1 (chosen value)."""
 _LONG = 2.2
-"""Ratio of the largest extent to the second largest above which a body counts as long. A long body lies horizontally
-in the picture. Chosen value."""
+"""Ratio of the largest extent to the second largest above which a body counts as long. A long body lies horizontally in
+the picture (chosen value)."""
 _ALONG = (0.45, 0.5)
-"""Components of the direction to the camera along a long body and along the upward axis. The component along the
-third axis is 1.55. Chosen values."""
+"""Components of the direction to the camera along a long body and along the upward axis. The component along the third
+axis is 1.55 (chosen values)."""
 _FILL = 0.84
-"""Fraction of a panel that the body fills. Chosen value."""
+"""Fraction of a panel that the body fills (chosen value)."""
 _SCALE = 0.28
-"""Largest length of the scale bar, relative to the width of a panel. Chosen value."""
+"""Largest length of the scale bar, relative to the width of a panel (chosen value)."""
 
 
 @dataclass(frozen=True)

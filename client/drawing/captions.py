@@ -19,7 +19,7 @@ from .scales import Scale
 
 _AXES = "#d1495b", "#2f9e60", "#3f74d8"
 _MOST_NAMES = 24
-"""Largest number of text lines of a legend. Chosen value."""
+"""Largest number of text lines of a legend (chosen value)."""
 
 
 @dataclass(frozen=True)

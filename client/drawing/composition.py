@@ -17,8 +17,8 @@ from .scales import Scale, rgb
 from .shot import Shot
 
 _FINE, _FINEST = 2, 4096
-"""Factor by which a picture is drawn larger before it is reduced, and the largest width or height in pixels for
-which the factor is used. Chosen values."""
+"""Factor by which a picture is drawn larger and then reduced, and largest width or height of a picture in pixels for
+which this is done (chosen values)."""
 _LINE = rgb(captions.LIGHT.ink)
 _GLASS = 0.55
 """Opacity of rigid walls in a picture with a transparent background."""

@@ -37,7 +37,7 @@ class Field:
     component: int | None = None
     """Component of ``array``. If None, the length of a vector is shown."""
     floor: float = 0.0
-    """Size of rounding errors, in ``unit``. A field whose values differ by less counts as uniform. Chosen value."""
+    """Size of rounding errors, in ``unit``. A field whose values differ by less counts as uniform (chosen value)."""
 
     def turns(self, axis: int) -> bool:
         """True if the field changes its sign in a mirror image across an axis."""

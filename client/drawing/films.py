@@ -13,7 +13,7 @@ from PIL import Image
 from ..errors import ViewError
 
 _LOOKED_AT = 5
-"""Number of frames, distributed evenly over the film, from which the 256 colours of a GIF are taken. Chosen value."""
+"""Number of frames, distributed evenly over the film, from which the 256 colours of a GIF are taken (chosen value)."""
 
 
 def save(images: Iterator[Any], n: int, rate: float, out: Path) -> None:

@@ -18,11 +18,11 @@ from .shot import Shot
 from .surfaces import Piece
 
 FAR = 4.0
-"""Distance of the camera from the centre, relative to the radius of the body. Chosen value: the camera stands
-outside of the walls."""
+"""Distance of the camera from the centre, relative to the radius of the body (chosen value: the camera stands outside
+of the walls)."""
 _SHADE = 0.04
 """Radius of the ambient occlusion, relative to the radius of the body. Hollows that are deeper than this radius are
-drawn darker. Chosen value."""
+drawn darker (chosen value)."""
 _LIGHTS = ((-0.7, 0.9, 1.6), 0.66), ((1.3, 0.2, 1.0), 0.34)
 """Position and intensity of the lights: a strong light from the upper left and a weaker light from the right."""
 _WALL = "#aab6c3"
@@ -30,8 +30,8 @@ _MATTER = {"ambient": 0.45, "diffuse": 0.85, "specular": 0.10, "specular_power":
 _ROUND = {"lighting": True, "ambient": 0.75, "diffuse": 0.45, "specular": 0.0, "smooth_shading": True}
 """Shading of curved walls: pale colours with a visible shape."""
 _FEATURE = 35.0
-"""Angle between two faces, degrees, above which the shading of their common edge is not smoothed. Chosen value:
-neighbouring faces of a curved surface differ by a smaller angle."""
+"""Angle between two faces, degrees, above which the shading of their common edge is not smoothed (chosen value:
+neighbouring faces of a curved surface differ by a smaller angle)."""
 
 
 @dataclass(frozen=True)

@@ -7,17 +7,17 @@ import numpy as np
 from .offscreen import Exposure
 
 _STRONG, _MIDDLE, _WEAK = 0.85, 0.6, 0.4
-"""Darkness of lines: around a part and at a jump of the depth, around a fragment, along an edge. Chosen values."""
+"""Darkness of lines: around a part and at a jump of the depth, around a fragment, along an edge (chosen values)."""
 _BEND = np.radians(38.0)
-"""Angle between two faces above which a line is drawn along their common edge. Chosen value: neighbouring faces of a
-curved surface differ by a smaller angle."""
+"""Angle between two faces above which a line is drawn along their common edge (chosen value: neighbouring faces of a
+curved surface differ by a smaller angle)."""
 _EVEN = np.radians(12.0)
-"""Difference of slopes, as an angle, below which neighbouring pixels count as one face. Chosen value: a crack with a
-width of one pixel has a larger difference."""
+"""Difference of slopes, as an angle, below which neighbouring pixels count as one face (chosen value: a crack with a
+width of one pixel has a larger difference)."""
 _WIDER = 1300
-"""Height of a panel, pixels, for each pixel of line width. Chosen value."""
+"""Height of a panel, pixels, for each pixel of line width (chosen value)."""
 _JUMP = 5.0
-"""Smallest jump of the depth between two bodies, as a multiple of the size of a pixel. Chosen value."""
+"""Smallest jump of the depth between two bodies, as a multiple of the size of a pixel (chosen value)."""
 
 
 def lines(shown: Exposure, pixel: float, height: int) -> Any:

@@ -11,7 +11,7 @@ Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 Bytes: TypeAlias = "np.ndarray[Any, np.dtype[np.uint8]]"
 
 HUES = np.array([252.0, 70.0, 165.0, 15.0, 305.0, 120.0, 205.0, 345.0])
-"""Hues of the first parts in OKLCH, degrees. Chosen values: colour-blind users can distinguish the first two hues."""
+"""Hues of the first parts in OKLCH, degrees (chosen values: colour-blind users can distinguish the first two hues)."""
 _STEPS = tuple(np.uint64(step) for step in (0xD1B54A32D192ED03, 0xABC98388FB8FAC03, 0x8CB92BA72F3D8DD7))
 """Factors 2^64 / g^k with g = 1.2207, the root of g^4 = g + 1. The multiples of these factors fill a cube evenly
 (Roberts 2018, R3)."""

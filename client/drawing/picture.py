@@ -26,8 +26,8 @@ class Picture(msgspec.Struct, kw_only=True, frozen=True):
     whole: list[int] = []
     hidden: list[int] = []
     focus: list[int] = []
-    """Numbers of parts: sections do not cut the parts ``whole``, the parts ``hidden`` are not drawn, the parts
-    ``focus`` fill the picture."""
+    """Numbers of parts, like ``whole`` and ``hidden``. Sections do not cut the parts in ``whole``; the parts in
+    ``hidden`` are not drawn; the parts in ``focus`` fill the picture."""
     opacity: dict[int, float] = {}
     range_of: list[str] = []
     """Frames whose values set the ends of the colour bar; if empty, the drawn frames set them."""

@@ -19,7 +19,7 @@ _FILL = 0.34
 _ENLARGED = 1.6
 """Height of letters in a picture without captions, relative to a picture with captions. Chosen value."""
 LEAST = 200
-"""Shortest side of a picture that has captions, pixels. Chosen value."""
+"""Shortest side of a picture that has captions, pixels (chosen value)."""
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ VIEWS: dict[str, Vector] = {
 }  # fmt: skip
 """Standard views, each with the direction from the body to the camera."""
 _FARTHEST = 1e6
-"""Largest distance of a plane from the origin, m. Chosen value: VTK draws in single precision."""
+"""Largest distance of a plane from the origin, m (chosen value: VTK draws in single precision)."""
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?\d+)?"
 _PLANE = re.compile(rf"\s*([xyz])\s*(?:=\s*({_NUMBER}|middle))?\s*")
 _AXIS = re.compile(r"\s*([+-]?)([xyz])\s*")

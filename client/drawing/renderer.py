@@ -1,6 +1,6 @@
-"""Control of the process that draws a picture. A process that hangs is ended, and a failure is reported in one line.
-If VTK cannot draw off screen, it ends its process with a segmentation fault. The process is a child process, so that
-the user gets an error message.
+"""Control of the process that draws a picture. A process that hangs is ended, and a failure is reported in one line. If
+VTK cannot draw off screen, it ends its process with a segmentation fault. Pictures are drawn in a child process, so
+that the user gets an error message.
 """
 
 import os
@@ -19,7 +19,7 @@ from ..local.atomic import whole
 from .picture import Drawn, Picture
 
 _SECONDS = 180.0
-"""Time limit for drawing a frame, s. Chosen value: a large frame takes long without a graphics card."""
+"""Time limit for drawing a frame, s (chosen value: a large frame takes long without a graphics card)."""
 
 
 def render(picture: Picture) -> Drawn:

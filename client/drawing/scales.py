@@ -11,12 +11,12 @@ from .fields import Field
 from .view_options import Look
 
 _PARTS = 6
-"""Largest number of intervals between the values of a colour bar. Chosen value."""
+"""Largest number of intervals between the values of a colour bar (chosen value)."""
 _UNIFORM = "#9fb0c0"
-"""Colour of a uniform field. No colour scale contains this colour, so that a uniform field cannot be mistaken for a
-low or a high value. Chosen value."""
+"""Colour of a uniform field. No colour scale contains this colour, so that a uniform field cannot be mistaken for a low
+or a high value (chosen value)."""
 _ALIKE = 1e-9
-"""Relative difference below which two values are equal except for rounding. Chosen value."""
+"""Relative difference below which two values are equal except for rounding (chosen value)."""
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

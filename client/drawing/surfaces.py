@@ -21,12 +21,13 @@ from .planes import Mirror
 Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 
 _DEBRIS = 0.003
-"""Fraction of the volume of a part that lies beyond each end of the bulk of the part."""
+"""Fraction of the volume of a part that lies beyond each end of its bulk (the main piece, without debris) along an
+axis."""
 _ASIDE = 0.25
-"""Distance from the bulk at which debris begins, relative to the length of the bulk. The camera frames the bulk
-only; with the chosen _DEBRIS and _ASIDE a few fragments far ahead do not make the body small in the picture."""
+"""Distance from the bulk of a part at which debris begins, divided by the length of the bulk. The camera frames the
+bulk only; with the chosen _DEBRIS and _ASIDE a few fragments far ahead do not make the body small in the picture."""
 _ONE = 1e-6
-"""Distance below which two points are merged, relative to the length of a body. Chosen value."""
+"""Distance below which two points are merged, relative to the length of a body (chosen value)."""
 
 
 @dataclass(frozen=True)
@@ -247,7 +248,7 @@ def _same(one: Mirror, other: Mirror, length: float) -> bool:
 
 
 def _chosen(mirrors: Sequence[Mirror]) -> Iterator[list[Mirror]]:
-    """Returns all combinations of mirrors; the first combination has no mirror and stands for the body itself."""
+    """Yields all combinations of mirrors; the first combination has no mirror and stands for the body itself."""
     for flips in itertools.product((False, True), repeat=len(mirrors)):
         yield [mirror for mirror, flip in zip(mirrors, flips, strict=True) if flip]
 

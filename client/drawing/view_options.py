@@ -12,8 +12,8 @@ from conoid.cases.reading.similar import allowed
 from ..errors import LookError
 
 SMALLEST = 64
-"""Smallest and largest width and height of a picture, pixels. Chosen values: in a smaller picture the body is not
-recognizable."""
+"""Smallest width and smallest height of a picture, pixels (chosen values: in a smaller picture the body is not
+recognizable)."""
 ENDINGS = (".png", ".gif", ".mp4")
 FILMS = (".gif", ".mp4")
 _MOST_BANDS = 64

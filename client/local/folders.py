@@ -9,8 +9,8 @@ from conoid.cases.output import layout
 from ..errors import ClientError, UnfinishedError
 
 _NAMED = 8
-"""Largest number of runs that are named for a folder of several runs. Chosen value: as many as fit into one text
-line."""
+"""Largest number of runs that are named for a folder of several runs (chosen value: as many as fit into one text
+line)."""
 
 
 class Folder(Protocol):
@@ -55,7 +55,7 @@ class LocalFolder:
         return path
 
     def named(self, name: str) -> str:
-        """Returns the path of the folder."""
+        """Returns the path of a file in this folder."""
         return str(self.root / name)
 
     def _lacks(self, name: str) -> str:

@@ -21,10 +21,10 @@ from ..journal import from_line
 from ..remote.link import Link
 
 _PAUSE = 0.5
-"""Pause between two readings of the journal, s. Chosen value: a run sends a message four times a second."""
+"""Pause between two readings of the journal, s (chosen value: a run sends a message four times a second)."""
 _ASK_EVERY = 10.0
-"""Time without a message after which Slurm is asked, s. Chosen value: a few hundred users who follow runs cause one
-request in 30 ms."""
+"""Time without a message after which Slurm is asked, s (chosen value: a few hundred users who follow runs cause one
+request in 30 ms)."""
 _AT_WORK = {State.STARTING, State.RUNNING}
 """States of a run in which a worker writes into the folder."""
 
@@ -40,7 +40,7 @@ class _File:
     name, trouble = "journal", ""
 
     def get(self, timeout: float) -> AnyMessage | None:
-        """A subscription without messages."""
+        """Returns None: this subscription has no messages."""
         return None
 
     def close(self) -> None:
@@ -134,8 +134,8 @@ class FolderRun:
         return Status(run=self.id, wall=time.time(), state=state, cause=cause, message=message)
 
     def _ask(self, state: State) -> Iterator[Status]:
-        """Yields news from Slurm about a job without messages. Without a job, it yields whether the worker still
-        exists. ``state``: last state in the journal.
+        """Yields the state that Slurm reports for a job, if the run has sent no message for some time. Without a job,
+        it yields whether the worker still exists. ``state``: last state in the journal.
         """
         if time.monotonic() - self._asked <= _ASK_EVERY:
             return

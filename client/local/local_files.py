@@ -35,7 +35,8 @@ class LocalFile:
     sha256: str
     state: State
     named_in: str = ""
-    """Hash of the deck itself. It is set for a deck with includes, which is written as one file to ``path``."""
+    """Hash of a deck with includes, without the included files. The field ``named_in`` is set for a deck with includes,
+    which is written as one file to ``path``."""
 
     @property
     def size(self) -> int:

@@ -16,7 +16,7 @@ of the included file replace this line."""
 _INCLUDES = re.compile(rb"(?i)\n(?:\xef\xbb\xbf)?[ \t]*[*#][ \t]*INCLUDE")
 _CHUNK, _LINE = 1 << 20, 200
 """Number of bytes that are searched at a time, and number of bytes of an incomplete line that are searched again with
-the next bytes. Chosen values: a search needs a few MB of memory for a file of any size."""
+the next bytes (chosen values: a search needs a few MB of memory for a file of any size)."""
 _STANDARD = "*KEYWORD"
 
 

@@ -20,10 +20,10 @@ ADDRESS_FILE = "server.json"
 LOG_FILE = "server.log"
 OWNER = "local"
 _START_SECONDS = 60.0
-"""Time limit for the start of a server, s. Chosen value: a start takes one or two seconds, and many times longer on
-a busy machine."""
+"""Time limit for the start of a server, s (chosen value: a start takes one or two seconds, and many times longer on a
+busy machine)."""
 _STOP_SECONDS = 15.0
-"""Time, s, after which a server that does not end is killed: ``GRACE`` for its workers, and 5 s for the server
+"""Time, s, after which a server that does not end is killed. It is ``GRACE`` for the workers plus 5 s for the server
 itself."""
 GRACE = 10.0
 """Time, s, after which a cancelled worker that does not end is killed."""

@@ -1,5 +1,5 @@
-"""Address of the server and token of the user. They are taken from options, else from the environment, else from the
-user's configuration file.
+"""Address of the server and token of the user. Address and token are taken from options, else from the environment,
+else from the user's configuration file.
 """
 
 import os

@@ -32,8 +32,8 @@ _AS_IT_IS = {"Accept-Encoding": "identity"}
 """Header of a request for a file, so that the answer contains the length of the file."""
 
 _ANSWER, _CONNECTION = 30.0, 5.0
-"""Time limits in s for an answer and for a connection; an answer may take long if the server's disk is slow. Chosen
-values."""
+"""Time limits in s for an answer and for a connection; an answer may take long if the server's disk is slow (chosen
+values)."""
 _TIMEOUT = httpx2.Timeout(_ANSWER, connect=_CONNECTION)
 _STREAM_TIMEOUT = httpx2.Timeout(60.0, connect=_CONNECTION)
 """Longest silence of a stream, s: four times the 15 s after which the server sends a comment
@@ -41,16 +41,16 @@ _STREAM_TIMEOUT = httpx2.Timeout(60.0, connect=_CONNECTION)
 _SPARE = 10.0
 """Additional time, s, for an answer whose headers arrive byte by byte; after it the request is given up."""
 _SLOWEST = 1000.0
-"""Smallest mean rate of an answer after its first 30 s, bytes per s. Chosen value: slower than any real connection."""
+"""Smallest mean rate of an answer after its first 30 s, bytes per s (chosen value: slower than any real connection)."""
 UNAUTHORIZED = 401
 """HTTP status of a request without a valid token."""
 NOT_FOUND = 404
 _TRIES = 3
-"""Number of tries of a request that may be repeated; the pauses are 0.3 s and 0.6 s. Chosen value: most lost
-connections are back after these pauses."""
+"""Number of tries of a request that may be repeated; the pauses are 0.3 s and 0.6 s (chosen value: most lost
+connections are back after these pauses)."""
 _PATIENCE = 10.0
-"""Time after which a failed request is not repeated, s. Chosen value: a server that is silent for this time hangs.
-In this time three connections, or one answer, can reach their time limit."""
+"""Time after which a failed request is not repeated, s (chosen value: a server that is silent for this time hangs). In
+10 s three connections, or one answer, can reach their time limit."""
 
 
 class Router(msgspec.Struct, kw_only=True, frozen=True):
@@ -73,7 +73,7 @@ class Me(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Http:
-    """An HTTP client of one server. It is a context manager; otherwise call ``close``."""
+    """An HTTP client of one server. An ``Http`` is a context manager; without a ``with`` statement, call ``close``."""
 
     def __init__(self, url: str, token: str | None = None, transport: httpx2.BaseTransport | None = None) -> None:
         """Stores address and token; the first request opens the connection. ``transport`` replaces the network, for

@@ -11,8 +11,8 @@ Refill = Callable[[int], list[AnyMessage]]
 """Function that returns the messages of the journal after a given number, in order."""
 
 _TRIES = 3
-"""Number of readings of the journal for a missing message before the message is given up. Chosen value: the journal
-is written before a message is sent, so that the first reading has the message unless the file system lags."""
+"""Number of readings of the journal for a missing message before the message is given up (chosen value: the journal is
+written before a message is sent, so that the first reading has the message unless the file system lags)."""
 
 
 class InOrder:
@@ -33,7 +33,7 @@ class InOrder:
         self.missing = 0
 
     def take(self, message: AnyMessage) -> Iterator[AnyMessage]:
-        """Yields the messages that are in order without gaps after ``message`` has arrived."""
+        """Yields the messages that now follow the last yielded message without a gap, after ``message`` has arrived."""
         for attempt in range(_TRIES):
             if message.seq <= self.last + 1:
                 break

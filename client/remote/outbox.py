@@ -15,10 +15,10 @@ from .sending import send
 from .submission import CaseSource, body_of, data_of, folder_of, to_json
 
 SURVEY = 330.0
-"""Time limit for the answer to a case with files, s. The server reads the files before it answers, within at most
-300 s (server/intake/reader.py). Chosen value."""
+"""Time limit for the answer to a case with files, s. The server reads the files before it answers, within at most 300 s
+(server/intake/reader.py) (chosen value)."""
 _POINT = 30.0
-"""Additional time, s, for each point of a sweep whose files differ from those of the point before. Chosen value."""
+"""Additional time, s, for each point of a sweep whose files differ from those of the point before (chosen value)."""
 
 
 class Outbox:

@@ -13,10 +13,10 @@ from conoid.cases.figures import size
 from ..errors import ClientError
 
 WORDS = 300
-"""Largest number of characters of an error message that are shown. Chosen value."""
+"""Largest number of characters of an error message that are shown (chosen value)."""
 LONGEST = 1 << 28
-"""Largest size, bytes, of an answer that is read into memory or has no announced length. Chosen value: ten times the
-largest snapshot."""
+"""Largest size, bytes, of an answer that is read into memory or has no announced length (chosen value: ten times the
+largest snapshot)."""
 
 
 def problem(status: int, content: bytes) -> Mapping[str, Any]:

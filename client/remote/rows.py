@@ -11,7 +11,7 @@ from conoid.cases.reference.flat import Scalar
 from .run_info import RunInfo
 
 _NEVER = frozenset({"run.ranks", "run.threads", "run.profile"})
-"""Keys of a case that have columns of their own in a list of runs."""
+"""Keys of a case that ``differing`` leaves out, because a list of runs has columns of their own for them."""
 
 
 class Result(msgspec.Struct, kw_only=True, frozen=True):

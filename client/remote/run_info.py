@@ -41,7 +41,7 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
     short: str = ""
     """Shortest unique prefix of the id; only runs in lists have it."""
     estimate: dict[str, Any] = {}
-    """Estimate of the needs of the run. Runs in lists have neither this field nor the fields below (_OF_ONE)."""
+    """Estimate of the needs of the run. Runs in lists have neither ``estimate`` nor the fields below it (_OF_ONE)."""
     progress: Progress | None = None
     outcome_json: msgspec.Raw = msgspec.field(name="outcome", default=msgspec.Raw(b"null"))
 

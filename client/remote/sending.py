@@ -16,15 +16,15 @@ from ..local.local_files import LocalFile
 from .http import Http
 
 _LARGEST, _SMALLEST = 1 << 20, 1 << 14
-"""Smallest and largest size of a piece, bytes. Chosen values: a proxy accepts requests of 1 MiB; at 1 kB/s a piece
-of 16 KiB arrives within the time limit."""
+"""Smallest and largest size of a piece, bytes (chosen values: a proxy accepts requests of 1 MiB; at 1 kB/s a piece of
+16 KiB arrives within the time limit)."""
 _FIRST = 1 << 17
-"""Size of the first piece, bytes, used before the speed of the connection is known. Chosen value."""
+"""Size of the first piece, bytes, used before the speed of the connection is known (chosen value)."""
 _WANTED = 2.0
-"""Intended time for sending a piece, s; after a slower piece the next pieces are smaller. Chosen value: a broken
-connection loses at most one piece."""
+"""Intended time for sending a piece, s; after a slower piece the next pieces are smaller (chosen value: a broken
+connection loses at most one piece)."""
 _PATIENCE = 60.0
-"""Time without progress, s, after which the upload is given up. Chosen value: a server restarts in less time."""
+"""Time without progress, s, after which the upload is given up (chosen value: a server restarts in less time)."""
 _PAUSE = 0.5
 """Pause, s, after a broken connection before the client asks the server how many bytes have arrived."""
 _LAST = 120.0

@@ -31,20 +31,20 @@ from .run_query import Moment, query_of, words_of
 from .submission import CaseSource, data_of, to_json
 
 _CANDIDATES = 8
-"""Largest number of ids that are listed for an ambiguous prefix. Chosen value: as many as fit into one text line."""
+"""Largest number of ids that are listed for an ambiguous prefix (chosen value: as many as fit into one text line)."""
 _LAST = "z" * 22
 """Text that, appended to a prefix of an id, sorts after every id with this prefix."""
 _MOST_PAGES = 10_000
-"""Largest number of pages of a list. Chosen value: a list of a million runs; a longer list is an error of the
-server."""
+"""Largest number of pages of a list (chosen value: a list of a million runs; a longer list is an error of the
+server)."""
 _POINT = 0.5
-"""Time, s, for each point of a sweep. The server reads, checks and writes all points to disk before it answers.
-Chosen value: ten times the time on two cores at a load of 4.
+"""Time, s, for each point of a sweep. The server reads, checks and writes all points to disk before it answers (chosen
+value: ten times the time on two cores at a load of 4).
 """
 _PAGE = 500
 """Number of rows of a page of the table of runs: the largest number that a server sends."""
 _READING, _REST = 60.0, 0.2
-"""Time limit for results that the server has not read yet, and pause between two requests, s. Chosen values."""
+"""Time limit for results that the server has not read yet, and pause between two requests, s (chosen values)."""
 
 
 class _Known(Protocol):
@@ -71,7 +71,7 @@ class Page(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Session(Http):
-    """A session with a server. It is a context manager; otherwise call ``close``."""
+    """A session with a server. A ``Session`` is a context manager; without a ``with`` statement, call ``close``."""
 
     def __init__(self, url: str, token: str | None = None, transport: httpx2.BaseTransport | None = None) -> None:
         """Accepts the arguments of ``Http``."""

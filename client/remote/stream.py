@@ -29,21 +29,21 @@ from .message_order import InOrder, Refill
 T = TypeVar("T")
 
 _CAPACITY = 4096
-"""Largest number of messages that wait to be read. Chosen value: a run sends about ten messages per second, so that
-they last for minutes."""
+"""Largest number of messages that wait to be read (chosen value: a run sends about ten messages per second, so that
+they last for minutes)."""
 _BLOBS = 4
 """Number of snapshots that are kept until they are read. With the chosen number, a snapshot that is read is at most
 some seconds old."""
 _OPEN_SECONDS = 5.0
-"""Time limit for the answer of the Zenoh router, s; afterwards SSE is used. Chosen value."""
+"""Time limit for the answer of the Zenoh router, s; afterwards SSE is used (chosen value)."""
 _CLOSE_SECONDS = 2.0
-"""Time limit for closing a subscription, s. Chosen value: a subscription that stays open does no harm."""
+"""Time limit for closing a subscription, s (chosen value: a subscription that stays open does no harm)."""
 _SILENCE = 3.0
-"""Time without a message after which the journal is read, s. Chosen value: a run sends a message four times a
-second."""
+"""Time without a message after which the journal is read, s (chosen value: a run sends a message four times a
+second)."""
 _PATIENCE = 60.0
-"""Time without an answer of the server after which the client stops following a run, s. Chosen value: a server
-restarts in less time."""
+"""Time without an answer of the server after which the client stops following a run, s (chosen value: a server restarts
+in less time)."""
 
 
 class StreamError(ClientError):
@@ -94,7 +94,7 @@ class ZenohLink:
             self._mailbox.put(message)
 
     def _keep(self, message: Snapshot, payload: bytes) -> None:
-        """Returns the bytes of a snapshot; None if the bytes have not arrived or are incomplete."""
+        """Keeps the bytes of a snapshot that has arrived completely."""
         with suppress(msgspec.MsgspecError):
             data = fragments_from_msgpack(payload).blob
             if hashlib.sha256(data).hexdigest() == message.sha256:

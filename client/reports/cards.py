@@ -16,7 +16,7 @@ from . import html
 from .compare import summary
 
 _CUTS = 50
-"""Largest number of changes of the load balance in the table. Chosen value."""
+"""Largest number of changes of the load balance in the table (chosen value)."""
 _PARAMETERS = {"rayleigh": "mode", "exponential": "mean", "power": "exponent"}
 
 

@@ -22,8 +22,8 @@ _COLOURS = {
 _RANKS = ["#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d"]
 _INK, _FAINT = "#1d2733", "#b5bcc4"
 _NAMED = len(_RANKS)
-"""Largest number of ranks that have colours of their own. If a run has more ranks, only the ranks with the most and the
-fewest nodes at the end have a colour."""
+"""Largest number of ranks that have colours of their own in a chart. If a run has more ranks, only the ranks with the
+most and the fewest nodes at the end have a colour."""
 PAPER = {
     "glass_steel_bar": (
         "Moon, Kim and Lee, fig. 17: 18 cuts on 16 processors, domain 4, by the impact, grows most; "

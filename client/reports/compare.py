@@ -28,7 +28,7 @@ _DRAWN = (
     "kinetic", "elastic", "plastic", "contact", "friction", "eroded", "fracture", "cohesive", "stepping", "averaging",
 )  # fmt: skip
 AT_THE_END = ", at the end"
-"""Suffix of the name of a history column, for the last value of the column."""
+"""Text after the name of a history column that stands for the last value of the column."""
 _UNITS = {"time": "s", "elapsed": "s", "cpu": "s", "eroded_mass": "kg", "element_updates_per_second": "1/s"}
 
 

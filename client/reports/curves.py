@@ -28,9 +28,9 @@ _LEDGER = (
 )  # fmt: skip
 _DASHES = ("-", "--", ":")
 _LIMITERS = 6
-"""Largest number of limits of the time step that have colours of their own. Chosen value."""
+"""Largest number of limits of the time step that have colours of their own (chosen value)."""
 _PROBES = 8
-"""Largest number of curves in a panel. Chosen value."""
+"""Largest number of curves in a panel (chosen value)."""
 
 
 def save(figure: Figure, out: Path) -> Path:

@@ -33,11 +33,11 @@ THREE = (
 """Path of three.js in its package, and its sha256 in the wheel of ``VERSION`` on PyPI. The live page uses the same
 file."""
 MOST = 24
-"""Largest number of snapshots in a report, evenly spaced over the run; fewer if the snapshots are too large. Chosen
-value."""
+"""Largest number of snapshots in a report, evenly spaced over the run; fewer if the snapshots are too large (chosen
+value)."""
 BUDGET = 2_200_000
-"""Largest total size of the compressed snapshots in a report, bytes. Base64 makes the snapshots a third larger.
-Chosen value: the whole report stays below 5 MB."""
+"""Largest total size of the compressed snapshots in a report, bytes. Base64 makes the snapshots a third larger (chosen
+value: the whole report stays below 5 MB)."""
 _WEB = Path(__file__).parent.parent / "web"
 _IMPORT = re.compile(r"""(?:import|export)\s*(?:\{([^}]*)\}|\*)?[^;'"]*["']\./([\w-]+\.js)["']""")
 _RELATIVE = re.compile(r"""(from\s*|import\s*\(\s*|import\s+)(["'])\./""")

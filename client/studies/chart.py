@@ -10,7 +10,7 @@ from .study import Study
 
 _WIDTH, _HEIGHT, _LEFT, _TOP, _SIDE = 424, 464, 56, 36, 320
 """Sizes in pixels: width and height of the picture; left, top and side of the square of the axes. Numbers and legend
-have space around the square. Chosen values."""
+have space around the square (chosen values)."""
 _BLUE, _RED, _GREY = "#1b6ca8", "#c8553d", "#999999"
 
 

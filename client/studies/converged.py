@@ -19,7 +19,8 @@ from .trade import Target
 from .variants import Variant
 
 _ENOUGH = 0.05
-"""Relative difference of means for which the table of ensembles gives the required number of runs. Chosen value."""
+"""Relative difference of two means. The table of ensembles gives the number of runs that is needed to detect this
+difference (chosen value)."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ class Book:
         return [each for each in self.numbers if each.expected is not None and each.name not in goals]
 
     def moving(self) -> list[str]:
-        """Quantities with a relative error that converge and differ between the meshes."""
+        """Names of the quantities that converge, have a relative error, and differ between the meshes."""
         return [
             name
             for name, (each, _) in self.goals().items()

@@ -14,9 +14,9 @@ from .trade import Target
 
 _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2")
 _PANELS = 6
-"""Largest number of quantities in the picture. Chosen value."""
+"""Largest number of quantities in the picture (chosen value)."""
 _LEAST = 1e-6
-"""Relative error that is drawn for an error of 0, because the axis is logarithmic. Chosen value."""
+"""Relative error that is drawn for an error of 0, because the axis is logarithmic (chosen value)."""
 
 
 def figure(book: Book) -> Figure:

@@ -14,7 +14,7 @@ _COUNTS = ("broken", "fragments", "eroded")
 _NO_STORE = ("initial", "external", "stepping", "averaging", "residual")
 """Terms of the energy balance that are not energies of the final state."""
 _FLOOR, _SHARE = 1e-6, 0.01
-"""Negligible differences: a millionth of the value, and a hundredth of the tolerance of a reference. Chosen values."""
+"""Negligible differences: a millionth of the value, and a hundredth of the tolerance of a reference (chosen values)."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +76,8 @@ def _references(outcome: Outcome) -> Iterator[Number]:
 
 
 def _probes(case: Case, columns: Columns) -> Iterator[Number]:
-    """Returns three quantities for each probe: the mean over time, the value with the largest magnitude, and the
-    last value.
+    """Yields three quantities for each probe: the mean over time, the value with the largest magnitude, and the last
+    value.
     """
     for name in (probe.name for probe in case.probes):
         values, unit = columns.numbers(name), columns.units[name]

@@ -1,5 +1,5 @@
-"""Replay of the measured loads of a run with another policy of load balance, without the solver. It shows what new
-decompositions would have cost and saved.
+"""Replay of the measured loads of a run with another policy of load balance, without the solver. The replay shows what
+new decompositions would have cost and saved.
 
 A run reports the cost of each group of tets at intervals (worker/migration/groups.py). A decomposition assigns
 groups to ranks in the same way as in the run: the first decomposition by numbers of tets, later decompositions by
@@ -108,7 +108,7 @@ def read(messages: Iterable[AnyMessage], policy: str = "") -> Record:
 
 def replay(record: Record, spec: Spec, ranks: int, cost: float, scale: Point = (1.0, 1.0, 1.0)) -> Account:
     """Returns the result of the policy ``spec`` on ``ranks`` ranks; each decomposition costs ``cost`` s. ``scale``:
-    factors of positions before each decomposition. There must not be more ranks than groups.
+    factors of positions before each decomposition. The number of ranks must not exceed the number of groups.
     """
     if not 1 <= ranks <= len(record.centres):
         raise UsageError(f"ranks = {ranks}: allowed: 1 to {len(record.centres)}, the number of groups")
@@ -165,8 +165,8 @@ def named(spec: Spec) -> str:
 
 
 def _looks(spec: Spec, before: int, now: int) -> Iterator[int]:
-    """Yields the steps, after ``before`` and up to ``now``, before which the policy decides about a decomposition.
-    The last yielded step is ``now``.
+    """Yields the time steps before which the policy decides about a decomposition: those after ``before`` and up to
+    ``now``. The last yielded step is ``now``.
     """
     if spec.policy == "every":
         yield from range((before // spec.every + 1) * spec.every, now, spec.every)
@@ -189,9 +189,10 @@ def _sums(held: list[Shares], values: Sequence[float]) -> list[float]:
 
 
 def divide(places: Sequence[Point], weights: Sequence[float], ranks: int) -> list[Shares]:
-    """Returns the groups of each rank. Boxes are cut across their longest axis so that the sums of ``weights``
-    (groups,) are equal. A group at a cut is divided between two ranks. If the number of ranks is not a power of two,
-    it is split as floor : ceiling.
+    """Returns the groups of each rank. The box of all groups is cut across its longest axis so that both parts have
+    equal sums of ``weights`` (groups,) for each of their ranks; each part is cut again in the same way. A group at a
+    cut is divided between two ranks. If the number of ranks of a part is odd, one side of the cut gets one rank more
+    than the other.
     """
     return _halved([(group, 1.0) for group in range(len(places))], places, weights, ranks)
 

@@ -18,11 +18,11 @@ SAFETY, CAUTION = 1.25, 3.0
 SLOWEST = 0.5
 """Order below which Eca and Hoekstra do not trust an extrapolation."""
 _ORDERS = (0.01, 12.0)
-"""Range in which the observed order is searched. Chosen value: relative differences below 0.01 are not significant."""
+"""Range in which the observed order is searched (chosen value: relative differences below 0.01 are not significant)."""
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 _SCAN, _HALVINGS = 240, 80
-"""Number of orders that are tried, and number of golden-section steps around the best order. Chosen values: the
-error of the order is 1e-12."""
+"""Number of orders that are tried, and number of golden-section steps around the best order (chosen values: the error
+of the order is 1e-12)."""
 
 
 class Trend(StrEnum):
@@ -128,12 +128,12 @@ def _line(sizes: Sequence[float], values: Sequence[float], order: float) -> Fit:
 
 
 def limit(sizes: Sequence[float], values: Sequence[float], floor: float = 0.0, formal: float = FORMAL) -> Limit:
-    """Returns the limit of values on meshes with the element sizes ``sizes``. Differences up to ``floor`` are
+    """Returns the limit of values on meshes with the element sizes ``sizes``. Differences of values up to ``floor`` are
     negligible.
 
-    Monotone values with an order of at least 0.5 converge. Their uncertainty is 1.25 times the sum of the distance
-    from the limit and the deviation of the curve. If the values do not converge, the uncertainty is three times
-    their range.
+    Monotone values with an order of at least 0.5 converge. The uncertainty of such values is 1.25 times the sum of the
+    distance from the limit and the deviation of the curve. If the values do not converge, the uncertainty is three
+    times their range.
     """
     order = sorted(range(len(sizes)), key=lambda k: sizes[k])
     sizes, values = [sizes[k] for k in order], [values[k] for k in order]

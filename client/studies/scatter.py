@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from statistics import NormalDist, fmean, stdev
 
 CONFIDENCE, POWER = 0.95, 0.8
-"""Significance level and power of statistical tests. Chosen values: usual in experiments."""
+"""Significance level and power of statistical tests (chosen values: usual in experiments)."""
 _NORMAL = NormalDist()
 
 
@@ -27,7 +27,7 @@ class Sample:
 
     @property
     def error(self) -> float:
-        """Standard error of the mean."""
+        """Standard error of the mean of the members."""
         return self.deviation / math.sqrt(len(self.values))
 
 

@@ -13,7 +13,7 @@ from .richardson import FORMAL, Trend
 from .variants import Variant
 
 _VAGUE = 0.3
-"""Relative uncertainty above which a limit is not used as the target of errors. Chosen value."""
+"""Relative uncertainty above which a limit is not used as the target of errors (chosen value)."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +37,10 @@ class Target:
 
 
 def target(all_series: Sequence[Series], number: Number, own: Variant | None = None) -> Target | None:
-    """Returns the limit that is the target of errors. It is the limit of ``own``, the variant of the case, if this
-    variant converges; otherwise the limit with the smallest uncertainty. The smallest uncertainty alone does not
-    decide, because a pressure form that locks can converge to a wrong limit. None if no variant converges.
+    """Returns the limit that is the target of errors. The target is the limit of ``own``, the variant of the case, if
+    this variant converges; otherwise the limit with the smallest uncertainty. The smallest uncertainty alone does not
+    decide, because a pressure form that locks can converge to a wrong limit. The function returns None if no variant
+    converges.
     """
     found = [(each.limits[number.name], each.variant) for each in all_series if _sure(each, number)]
     if not found:

@@ -26,10 +26,10 @@ from .goal import Goal, Span, changes, goal_of, tolerance_of
 from .reporting import Reported, Reporter
 
 MOST = 40
-"""Largest number of runs if the user gives no number. Chosen value: 20 bisections narrow a bracket to a millionth."""
+"""Largest number of runs if the user gives no number (chosen value: 20 bisections narrow a bracket to a millionth)."""
 _AT_ONCE = 8
-"""Largest number of points that are computed at the same time if the user gives no number. Chosen value: n points
-divide the bracket by n + 1, so that more points gain little."""
+"""Largest number of points that are computed at the same time if the user gives no number (chosen value: n points
+divide the bracket by n + 1, so that more points gain little)."""
 _ATTEMPTS = 100
 """Largest number of attempts to compute a point."""
 Say = Callable[[str], None]
@@ -158,7 +158,9 @@ def _report(wanted: Search, reporter: Reporter, tried: Sequence[Tried], *, over:
 
 
 def _next(wanted: Search, tried: Sequence[Tried], spent: int, many: int) -> tuple[list[float], str]:
-    """Returns the points of the next round. At the end of the search it returns no points and the reason of the end."""
+    """Returns the values of x of the next round of runs. At the end of the search the function returns no values and
+    the reason of the end.
+    """
     low, high = wanted.ends
     left = wanted.most - spent
     taken = [each.x for each in tried]

@@ -14,24 +14,24 @@ _FREE, FEWEST = 4, 3
 """Smallest number of points for a fit with a free exponent, and for a fit with a fixed exponent. Each number is one
 more than the number of constants, so that the error can be estimated."""
 _NEAREST = 4
-"""Number of points for the fit of a line. Chosen value: between the points nearest to the root the curve is nearly
-straight."""
+"""Number of points for the fit of a line (chosen value: between the points nearest to the root the curve is nearly
+straight)."""
 _EXPONENT = 1.0, 6.0
-"""Bounds of the exponent p. Chosen values: an energy balance has p = 2, long rods at high speed have up to 5
-(Lambert and Jonas 1976)."""
+"""Bounds of the exponent p; chosen values: an energy balance has p = 2, long rods at high speed have up to 5 (Lambert
+and Jonas 1976)."""
 _COURSE = 60
-"""Number of points of a curve in a chart. Chosen value: a chart is a few hundred pixels wide."""
+"""Number of points of a curve in a chart (chosen value: a chart is a few hundred pixels wide)."""
 _AT_END = 1e-6
-"""Relative distance of a constant from an end of its range below which the constant counts as being at this end.
-Chosen value: larger than the tolerance of the least squares."""
+"""Relative distance of a constant from an end of its range below which the constant counts as being at this end (chosen
+value: larger than the tolerance of the least squares)."""
 _STOPPED = 0.2
-"""Largest residual velocity below the ballistic limit, relative to the largest residual velocity. Chosen value: a
-rebound has a few per cent."""
+"""Largest residual velocity below the ballistic limit, relative to the largest residual velocity (chosen value: a
+rebound has a few per cent)."""
 
 
 class Fit(msgspec.Struct, kw_only=True, frozen=True):
     """A fitted curve. ``limit`` is the velocity at which the curve begins, or the x at which a line crosses the
-    threshold. ``error`` is the standard error of the limit. Both have the unit of x.
+    threshold. ``error`` is the standard error of the limit. ``limit`` and ``error`` have the unit of x.
     """
 
     law: str

@@ -65,8 +65,8 @@ def _sign(value: float | None) -> int:
 
 
 def between(low: float, high: float, taken: Sequence[float], many: int) -> list[float]:
-    """Returns ``many`` new points between ``low`` and ``high``. Together with the points ``taken`` they divide the
-    interval as evenly as possible.
+    """Returns ``many`` new points between ``low`` and ``high``. The new points and the points ``taken`` together divide
+    the interval as evenly as possible.
     """
     ends = sorted({low, high, *(x for x in taken if low < x < high)})
     gaps = list(pairwise(ends))

@@ -15,10 +15,10 @@ from conoid.cases.units import parse_quantity, written
 
 _ADAPTIVE, _SET, _TOLERANCE = "--adaptive", "--set", "--tolerance"
 _SHARE = 0.01
-"""Default tolerance, relative to the larger end of the span. Chosen value: smaller than the scatter of ballistic
-tests."""
+"""Default tolerance, relative to the larger end of the span (chosen value: smaller than the scatter of ballistic
+tests)."""
 _DIGITS = 9
-"""Number of digits of a value at which a run is made. Chosen value: no case is sensitive to further digits."""
+"""Number of digits of a value at which a run is made (chosen value: no case is sensitive to further digits)."""
 
 
 class Goal(msgspec.Struct, kw_only=True, frozen=True):

@@ -28,7 +28,7 @@ from ..remote.run_info import ID, RunInfo
 from ..run import Run
 
 _LOOK = 2.0
-"""Pause between two checks for finished runs, s. Chosen value."""
+"""Pause between two checks for finished runs, s (chosen value)."""
 _COLUMNS = {"run", "state"}
 """Columns that the table of every sweep has."""
 Point = dict[str, Any]
@@ -121,7 +121,7 @@ class Sweep:
                 raise TimeoutError(f"sweep {self.id}: {len(left)} of {info.total} runs have not ended")
 
     def cancel(self) -> SweepInfo:
-        """Cancels all runs of the sweep. A second call has no further effect."""
+        """Cancels all runs of the sweep. A second call of ``cancel`` has no further effect."""
         return self.session.post(SweepInfo, f"{self.path}:cancel")
 
     def csv(self) -> str:

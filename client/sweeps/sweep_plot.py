@@ -12,7 +12,7 @@ from ..errors import ClientError, UsageError
 
 _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d", "#ff9da6")
 _PANELS = 6
-"""Largest number of results that are drawn by default. Chosen value: six panels are readable on one page."""
+"""Largest number of results that are drawn by default (chosen value: six panels are readable on one page)."""
 
 
 def figure(rows: Sequence[Row], keys: Sequence[str], x: str | None, columns: Sequence[str]) -> Figure:

@@ -76,7 +76,8 @@ export class Live {
     keep(this.loads, { t: message.t, imbalance: message.imbalance, ...compared(groups) });
   }
 
-  // Handles a Counts message. Its number of fragments may belong to an earlier step than the number in a snapshot.
+  // Handles a Counts message. The number of fragments in this message may belong to an earlier step than the number in
+  // a snapshot.
   on_counts(message) {
     const { t, step, nodes, facets, counted = -1 } = message;
     const fragments = this.spreads(counted < 0 ? step : counted, message) ? message.fragments : this.counts?.fragments ?? message.fragments;

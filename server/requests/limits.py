@@ -61,7 +61,7 @@ def _many(annotation: Any) -> bool:
 
 
 def _query(dependant: Dependant) -> Iterator[Any]:
-    """Returns the query parameters of a route, from FastAPI."""
+    """Yields the query parameters of a route, from FastAPI."""
     yield from dependant.query_params
     for inner in dependant.dependencies:
         yield from _query(inner)
@@ -169,7 +169,7 @@ def _cores(case: Case, settings: Limits) -> Iterator[Problem]:
 
 
 def _files(case: Case) -> Iterator[Problem]:
-    """Returns a problem for each file for which the case gives no hash. The paths in the case are valid only on the
+    """Yields a problem for each file for which the case gives no hash. The paths in the case are valid only on the
     machine on which the case was written.
     """
     for file in files_of(case.model_dump(include={"parts"})):

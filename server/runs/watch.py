@@ -49,7 +49,7 @@ class Watch:
         """Whether the last check has found new lines in the journal."""
 
     def look(self) -> Iterator[Event]:
-        """Returns the events since the last check of the worker. If the disk was full when the worker ended, the end
+        """Yields the events since the last check of the worker. If the disk was full when the worker ended, the end
         counts as an error of the disk, also if the end is handled later. Raises OSError if files of the run cannot be
         read.
         """

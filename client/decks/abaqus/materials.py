@@ -1,7 +1,7 @@
 """Conversion of materials of Abaqus/Explicit to materials of Conoid (Analysis User's Guide, "Materials").
 
-Where the formulas of Abaqus and Conoid differ, the account of the import has a note; docs/howto/import.md compares
-the formulas.
+Where a formula differs between Abaqus and Conoid, the account of the import (its list of all keywords) has a note;
+docs/howto/import.md compares the formulas.
 """
 
 from collections.abc import Sequence

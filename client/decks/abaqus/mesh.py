@@ -17,7 +17,7 @@ from .words import spelt
 _SHIFT = 40
 """Number of bits for a node or element number; the bits above contain the index of the instance."""
 _MOST = 20_000_000
-"""Largest number of members of one line of GENERATE. Chosen value: more than the nodes of any mesh that is run."""
+"""Largest number of members of one line of GENERATE (chosen value: more than the nodes of any mesh that is run)."""
 
 
 @dataclass
@@ -131,9 +131,7 @@ class AbaqusMesh:
         yield from self.members(scope, rest or item, kind)
 
     def members(self, scope: Scope, name: str, kind: str) -> Iterator[int]:
-        """Returns the members of a set of an instance or of its part; each number contains the index of the
-        instance.
-        """
+        """Yields the members of a set of an instance or of its part; each number contains the index of the instance."""
         if is_whole(name):
             yield (scope.place << _SHIFT) + int(name)
             return

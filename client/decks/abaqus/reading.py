@@ -199,7 +199,7 @@ class Abaqus:
         return {scope, *(one for one, made in self.instances.items() if made.key("PART") == scope)}
 
     def _of_elements(self, each: Keyword) -> set[str]:
-        """Returns the keys of the bodies whose elements all lie in a set. The result is empty if the set also has
+        """Returns the keys of the bodies whose elements all lie in a set. No keys are returned if the set also has
         other elements or only some elements of a body.
         """
         name = each.get("ELSET") or ""

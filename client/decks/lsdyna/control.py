@@ -27,8 +27,8 @@ _LAYOUT = (
     "SSID MSID SSTYP MSTYP SBOXID MBOXID SPR MPR", "FS FD DC VC VDC PENCHK BT DT", "SFS SFM SST MST SFST SFMT FSF VSF",
 )  # fmt: skip
 Surface = Callable[[int, int, Entry], frozenset[str]]
-"""Function that returns the bodies of a surface. Its arguments are the number and the type of the surface, and the
-keyword. The function raises ValueError."""
+"""Function that returns the bodies of a surface. The arguments of the function are the number and the type of the
+surface, and the keyword. The function raises ValueError."""
 
 
 def contact(block: Block, name: str, options: frozenset[str], entry: Entry, surface: Surface) -> Meeting:
@@ -78,7 +78,7 @@ def tied(block: Block, name: str, options: frozenset[str], entry: Entry, surface
 
 
 def _behind(block: Block, options: frozenset[str], entry: Entry | None) -> list[Card]:
-    """Returns the cards after the title and after the cards of the option MPP. This option has one card, and a
+    """Returns the cards after the title and after the cards of the option MPP. The option MPP has one card, and a
     second card if the next card begins with ``&``.
     """
     cards = trimmed(block.cards)[bool(options & {"ID", "TITLE"}) :]

@@ -66,8 +66,8 @@ def with_eos(fields: Fields, context: Context, shear: float) -> dict[str, Any]:
 
 
 def cut_off(fields: Fields, material: dict[str, Any], context: Context, pressure: float, name: str) -> None:
-    """Returns the key ``spall`` from a cut-off of the pressure below 0. Returns no key if the pressure cannot reach
-    the cut-off.
+    """Adds the key ``spall`` to a material, from a cut-off of the pressure below 0. The key is not added if the
+    pressure cannot reach the cut-off.
     """
     if -1e10 < context.system.si(pressure, STRESS) * 1e-9 < 0.0:
         material["spall"] = context.stress(-pressure)

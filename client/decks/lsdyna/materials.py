@@ -1,7 +1,7 @@
 """Conversion of materials and equations of state of LS-DYNA to Conoid (LS-DYNA Keyword User's Manual, volume II).
 
-Where the formulas of LS-DYNA and Conoid differ, the account of the import has a note; docs/howto/import.md compares
-the formulas.
+Where a formula differs between LS-DYNA and Conoid, the account of the import (its list of all keywords) has a note;
+docs/howto/import.md compares the formulas.
 """
 
 from collections.abc import Callable

@@ -69,8 +69,8 @@ def parts_of(block: Block) -> set[str]:
 
 
 def _heads(block: Block) -> list[Card]:
-    """Yields the cards with the numbers of element and part: each card, or each second card if the nodes are on a
-    card of their own.
+    """Returns the cards with the numbers of element and part: each card, or each second card if the nodes are on a card
+    of their own.
     """
     cards = list(block.filled())
     two = bool(cards) and len(_items(block, cards[0])) <= 2

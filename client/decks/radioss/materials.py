@@ -191,7 +191,7 @@ def _limit(fields: Fields) -> dict[str, Any]:
 
 
 def _damage(law: dict[str, Any], context: Context) -> dict[str, Any]:
-    """Reads ``/FAIL/JOHNSON``. Its constant D3 has the same sign in Radioss and Conoid."""
+    """Reads ``/FAIL/JOHNSON``. The constant D3 of ``/FAIL/JOHNSON`` has the same sign in Radioss and Conoid."""
     found = context.failure
     if found is None:
         return {}

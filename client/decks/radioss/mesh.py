@@ -34,8 +34,8 @@ def read_nodes(path: Path) -> dict[str, set[int]]:
 
 
 def _solids(option: Option) -> set[int]:
-    """Yields the nodes of each element of an option. An element takes as many lines as needed: first its number,
-    then its nodes.
+    """Returns the nodes of all elements of an option. An element takes as many lines as needed: first its number, then
+    its nodes.
     """
     count, found = SOLIDS[option.words[0]], set[int]()
     row: list[int] = []

@@ -67,7 +67,7 @@ class Radioss:
             self._options.append((option, entry))
 
     def _engine(self) -> None:
-        """Returns the path of the engine file, made from the name of the starter."""
+        """Reads the engine file, whose name is made from that of the starter, if the file exists."""
         stem = self.path.stem
         engine = self.path.with_name(f"{stem[:-4]}0001{self.path.suffix}") if stem.endswith("_0000") else None
         if engine is None or not engine.is_file():
