@@ -155,7 +155,7 @@ PATTERNS = {"cases/laws/NAME.py", "worker/materials/NAME.py", "server/routes/NAM
 
 
 def prose(path: Path) -> Iterator[str]:
-    """Returns the text of a page, or of the comments and docstrings of a module."""
+    """Yields the text of a page, or of the comments and docstrings of a module."""
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".md":
         yield text

@@ -77,8 +77,8 @@ def parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
 
 
 def excesses(name: str, source: str) -> Iterator[tuple[str, int]]:
-    """Returns the names that exceed a limit in a file: ``FILE``, ``FILE: CLASS``, ``FILE: FUNCTION`` or
-    ``FILE: FUNCTION(...)``.
+    """Yields the names that exceed a limit in a file: ``FILE``, ``FILE: CLASS``, ``FILE: FUNCTION`` or ``FILE:
+    FUNCTION(...)``.
     """
     small = name.startswith(SMALL)
     if (lines := len(source.splitlines())) > LONGEST_FILE:

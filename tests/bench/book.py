@@ -36,11 +36,11 @@ ROOT = Path(__file__).parents[2]
 OUT = ROOT / "build" / "accuracy"
 _QUIET = {"run.ranks": 1, "run.frames": 0, "run.snapshots": 0, "run.checkpoint_every": "none"}
 _COARSE = 2.0
-"""Factor of the element sizes in the second, cheaper run of a case. Chosen value."""
+"""Factor of the element sizes in the second, cheaper run of a case (chosen value)."""
 _RANKS = ("tests/parallel/", "tests/server/", "tests/client/")
 """Folders of tests that start processes for their work."""
 _QUICK = 60.0
-"""Estimated CPU time, s, above which ``quick`` leaves out a case. Chosen value."""
+"""Estimated CPU time, s, above which ``quick`` leaves out a case (chosen value)."""
 
 
 def catalogue() -> list[dict[str, Any]]:

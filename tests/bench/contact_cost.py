@@ -78,7 +78,7 @@ def _row(cost: Cost, names: Sequence[str]) -> list[Cell]:
 
 
 STEPS = {8: 1500, 16: 400}
-"""Number of ranks; the paper of Moon, Kim and Lee uses 8 ranks."""
+"""Number of time steps by the number of ranks; the paper of Moon, Kim and Lee uses 8 ranks."""
 DOMAINS = ("box", "arbitrary")
 PAPER = {
     "faces of a search": "1st: 7,284 / 5,467 = 1.33 (fig. 4)",

@@ -102,7 +102,7 @@ def row_of(name: str, outcome: Outcome, limit: float) -> Row:
 
 
 def rows() -> Iterator[Row]:
-    """Returns the table rows of the finished cases, hard cases first."""
+    """Yields the table rows of the finished cases, hard cases first."""
     for path in sorted(OUT.glob("*.json")):
         yield Row(**json.loads(path.read_text(encoding="utf-8")))
 
@@ -119,14 +119,14 @@ def page(found: Sequence[Row]) -> str:
     known = [plan.name for plan in plans()]
     left = sorted(set(known) - {r.case for r in found})
     return "\n\n".join([
-        "# Energy created by single lines of the energy balance",
+        "# Energy created by single terms of the energy balance",
         "The table contains every hard and every shipped case, each run on one rank. The command `python -m "
         "tests.bench.energy_lines` writes this table. The column \"worst line\" is the term of the energy balance that "
         "has created the most energy at any time of the run. The column \"made\" is the created energy over the "
         "largest energy of the run up to this time, \"at\" is the time, and \"limit\" is `run.made_limit`. The column "
         "\"estimated\" is the number of steps that `conoid validate` expects. The page "
-        "[theory/energy.md](../theory/energy.md), \"Energy that a line makes\", explains how the created energy is "
-        "counted.",
+        "[theory/energy.md](../theory/energy.md), \"Energy created by a term of the balance\", explains how the "
+        "created energy is counted.",
         f"{len(found)} of {len(known)} cases; {sum(r.bad for r in found)} succeeded above the limit."
         + (f" Not measured: {', '.join(left)}." if left else ""),
         *(["\n".join(wrong)] if wrong else []),

@@ -31,7 +31,7 @@ from .story import Story
 Changes = dict[str, Any]
 _BATCHES = ("first", "second", "paper")
 _DAYS = 60
-"""Period in which the runs were submitted. Chosen value."""
+"""Period in which the runs were submitted (chosen value)."""
 
 
 @dataclass(frozen=True)

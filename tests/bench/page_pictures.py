@@ -26,7 +26,7 @@ _LOOKS = (
 )  # fmt: skip
 _DRAWN = "[...document.querySelectorAll('.plot')].every((plot) => plot.querySelector('canvas'))"
 _SETTLED = 2.0
-"""Time in s after which the page does not change any more. Chosen value."""
+"""Time in s after which the page does not change any more (chosen value)."""
 
 
 def main(arguments: list[str]) -> None:

@@ -24,9 +24,9 @@ from tests.server.visitor import SHOWN, Site, sign_in
 from .page_scene import lay
 
 _FRAMES = 5.0
-"""Time for which the body is rotated, s. Chosen value."""
+"""Time for which the body is rotated, s (chosen value)."""
 _LEAST = 5
-"""Number of frames that are drawn, for any duration of a frame. Chosen value."""
+"""Number of frames that are drawn, for any duration of a frame (chosen value)."""
 _TURN = f"""(async () => {{
   const canvas = document.querySelector(".view3d canvas");
   canvas.scrollIntoView({{ block: "center" }});

@@ -10,9 +10,9 @@ from .table import Cell, table
 
 RED, GREEN, GREY = "🔴", "🟢", "⚪"
 _HELD = 3
-"""Number of assertions of a test that the page shows. Chosen value."""
+"""Number of assertions of a test that the page shows (chosen value)."""
 _WIDE = 96
-"""Number of characters of an assertion that the page shows. Chosen value."""
+"""Number of characters of an assertion that the page shows (chosen value)."""
 
 
 @dataclass
@@ -94,8 +94,8 @@ def _line(row: Mapping[str, Any], parts: Mapping[str, Any]) -> Line:
 
 
 def _add_case(line: Line, name: str, runs: Mapping[str, Any]) -> None:
-    """Returns the lines of the references of a case. References of the coarser run are shown, but do not make a row of
-    the catalogue fail.
+    """Adds the results of the reference values of a case to the row. Reference values of the coarser run are shown, but
+    do not make a row of the catalogue fail.
     """
     for label in ("as it is", "coarser"):
         outcome = runs.get(f"{name}|{label}")

@@ -21,9 +21,9 @@ from conoid.cases.run import State
 from .page_scene import blob
 
 _POINTS = 60
-"""Number of lines of history.csv. Chosen value: so many lines make a curve in a chart."""
+"""Number of lines of history.csv (chosen value: so many lines make a curve in a chart)."""
 _TRIANGLES = 400
-"""Size of a snapshot. Chosen value: twenty fragments."""
+"""Size of a snapshot (chosen value: twenty fragments)."""
 _ENDS: Sequence[tuple[State, str | None, str]] = (
     [(State.SUCCEEDED, None, "")] * 17
     + [(State.FAILED, "diverged", "the time step fell to 1.2e-14 s: tet 4711 of glass, held by its shape")]
@@ -32,7 +32,7 @@ _ENDS: Sequence[tuple[State, str | None, str]] = (
 )  # fmt: skip
 _LIMITER = "stability: tet 12 of part 0"
 _BALLISTIC = 160.0
-"""Impact speed above which a projectile perforates the target in these laws, m/s. Chosen value."""
+"""Impact speed above which a projectile perforates the target in these laws, m/s (chosen value)."""
 
 
 class Story:

@@ -42,13 +42,13 @@ class Block:
 
 @dataclass(frozen=True)
 class Pairs:
-    """Results of a run with a router in one state."""
+    """Measured blocks of steps of a run, with a router in one state."""
 
     way: str
     blocks: list[Block]
 
     def median(self, live: bool, what: str) -> float:
-        """Returns the times per step of the blocks with or without telemetry, s."""
+        """Returns the median time per step, s, of the blocks with or without telemetry."""
         return float(statistics.median(getattr(block, what) for block in self.blocks if block.live is live))
 
     def ratio(self, what: str) -> tuple[float, float, float]:

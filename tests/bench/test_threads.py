@@ -24,7 +24,7 @@ def test_a_scene_is_a_case(name: str) -> None:
 
 
 def made(folder: Path, trial: Trial, state: str = "succeeded") -> None:
-    """Returns a finished run."""
+    """Writes the files of a finished run."""
     place = folder / trial.folder
     place.mkdir(parents=True)
     ended = Outcome(state=state, steps=4, elapsed=9.0, setup=0.0, digest="abc", threads=trial.threads)

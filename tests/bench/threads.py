@@ -35,7 +35,7 @@ RANKS = "1,1x16,16,4x4,1x4,2x8,1x8,1x2"
 NETWORK = Network(latency=2e-6, bandwidth=5e9)
 _QUIET = ["run.frames=0", "run.snapshots=0", "reference=[]"]
 _LEAST = 10.0
-"""Time in s that must remain for a run to start. Chosen value: a run takes about five seconds to its first step."""
+"""Time in s that must remain for a run to start (chosen value: a run takes about five seconds to its first step)."""
 
 
 @dataclass(frozen=True)

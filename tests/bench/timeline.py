@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 from conoid.client.studies.projection import Network
 
 CALL = 3e-6
-"""CPU time of a call of the communicator, from Python to MPI and back, s. Chosen value: the time of a call of a kernel
-from Python."""
+"""CPU time of a call of the communicator, from Python to MPI and back, s (chosen value: the time of a call of a kernel
+from Python)."""
 MESSAGE = 0.5e-6
-"""CPU time of a message at each of its ends, s. Chosen value: the time in which MPI posts a message in shared
-memory."""
+"""CPU time of a message at each of its ends, s (chosen value: the time in which MPI posts a message in shared
+memory)."""
 
 
 @dataclass

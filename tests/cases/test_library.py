@@ -13,7 +13,7 @@ NAMES = sorted(library())
 
 
 def leaves(model: BaseModel, prefix: str = "") -> Iterator[str]:
-    """Returns the keys of all numbers of a material, defaults included."""
+    """Yields the keys of all numbers of a material, defaults included."""
     for key, value in model:
         if isinstance(value, BaseModel):
             yield from leaves(value, f"{prefix}{key}.")

@@ -23,7 +23,7 @@ CHECK = jsonschema.Draft202012Validator(SCHEMA)
 
 
 def keys(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Returns every key of every table of a case, with the schema of the key."""
+    """Yields every key of every table of a case, with the schema of the key."""
     for name, table in {"Case": schema, **schema["$defs"]}.items():
         for key, each in table.get("properties", {}).items():
             yield f"{name}.{key}", each

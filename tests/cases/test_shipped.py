@@ -217,9 +217,7 @@ def test_sliding_block() -> None:
 
 
 class Copper:
-    """Returns the material of the benchmark, copper: stress linear in logarithmic strain, J2 plasticity with linear
-    hardening.
-    """
+    """Material of the benchmark, copper: stress linear in logarithmic strain, J2 plasticity with linear hardening."""
 
     density, young, poisson, yielding = 8930.0, 117e9, 0.35, 0.4e9
     bulk = young / (3 * (1 - 2 * poisson))

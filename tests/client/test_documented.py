@@ -26,7 +26,7 @@ CLASSES = {"session": "Session", "run": "Run", "result": "Result", "sweep": "Swe
 
 
 def blocks(path: Path) -> Iterator[tuple[str, str]]:
-    """Returns language and text of each fenced block of a page."""
+    """Yields language and text of each fenced block of a page."""
     yield from re.findall(r"^```(\w*)\n(.*?)^```", path.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
 
 

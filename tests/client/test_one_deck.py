@@ -132,7 +132,7 @@ def test_a_deck_that_leads_out_of_its_folder_is_refused_in_a_line(tmp_path: Path
 
 
 def split(folder: Path, name: str, text: str, begin: str, end: str, line: str) -> None:
-    """Returns a deck whose lines from ``begin`` to ``end`` are in another file, and the same deck as one file."""
+    """Writes a deck whose lines from ``begin`` to ``end`` are in another file, and the same deck as one file."""
     at, to = text.index(begin), text.index(end)
     (folder / "sub").mkdir()
     (folder / "sub" / "mesh.inc").write_text(text[at:to])

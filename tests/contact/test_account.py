@@ -109,7 +109,7 @@ def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:
 
 
 def booked(account: Account, taken: float, early: float = 0.0) -> None:
-    """Returns the decision of a step in which contact has taken the energy ``taken``, J."""
+    """Adds the energies of a step, J, to the account: ``taken`` and ``early``."""
     account.words[0] += np.rint(np.array([taken, early]) * account.scale).astype(np.int64)
 
 

@@ -13,7 +13,7 @@ from .kernels import edge_edge, every_pair, lowest_heights, many, node_face
 ONE = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, -1.0], [0.0, -1.0, -1.0]])
 """An edge along x on top of a body: its two ends, and the third nodes of its two faces."""
 EDGES = np.array([[0, 1, 2, 3, 3, 2], [4, 5, 6, 7, 7, 6]], np.int32)
-"""Opposite nodes of the two tets at the edge ``ONE``."""
+"""The two edges ``ONE``, (2, 6): the two ends, the third nodes of the two faces, and the opposite nodes."""
 PAIR = np.array([[0, 1]], np.int32)
 
 

@@ -37,7 +37,7 @@ def foot(x: Floats, corners: Floats) -> Floats:
 
 
 class Expected:
-    """Returns the contact by the formulas of the docstrings, or None."""
+    """Contact of the node ``s`` with a face by the formulas of the docstrings of the kernels."""
 
     def __init__(self, x: Floats, v: Floats, s: int, face: "np.ndarray", size: float, own: bool, dt: float) -> None:
         three, then = face[:3], x + dt * v

@@ -249,7 +249,7 @@ def test_contacts_are_missed_where_leaving_a_line_does_not_count() -> None:
 
 
 class Pair:
-    """Returns a node far above one face."""
+    """A node far above one face, with the table of their pair."""
 
     def __init__(self) -> None:
         self.x = np.array([[0.2, 0.2, 9.0], *CORNERS])

@@ -1,4 +1,6 @@
-"""Loops over the surface that sort by ranges find what plain loops find, in the same order on any number of threads."""
+"""Loops over the surface that sort by ranges have the same results as plain loops, in the same order on any number of
+threads.
+"""
 
 import numpy as np
 import pytest

@@ -27,8 +27,8 @@ CRUSHED = "../../cases/hard/crush_cohesive"
 
 
 def stepping(name: str, steps: int, comm: Comm, every: int = 0, *changes: str) -> Iterator[Simulation]:
-    """Returns a scene after each of its first ``steps``; ``every``: number of steps after which a broad phase is made
-    at the latest.
+    """Yields a scene after each of its first ``steps``; ``every``: number of steps after which a broad phase is made at
+    the latest.
     """
     case = parse_case(apply_overrides(read_data(SCENES / f"{name}.toml"), ["run.frames=0", *changes]))
     sim = simulation.build(case, Path(), comm)

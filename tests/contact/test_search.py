@@ -299,7 +299,7 @@ def test_position_codes_have_every_box_once_in_each_cell_that_it_touches(
 
 
 def test_a_hash_holds_few_codes() -> None:
-    """Returns the largest number of entries of one hash, for the cells of a full cube, of a layer and of a line."""
+    """At most 16 entries have the same hash, for the cells of a full cube, of a layer and of a line."""
     for shape in ((16, 16, 16), (64, 64, 1), (4096, 1, 1), (1, 1, 4096)):
         low: Floats = np.ascontiguousarray(np.argwhere(np.ones(shape)) + 0.25)
         table = sorted_boxes(low, low + 0.5, 1.0)

@@ -32,7 +32,7 @@ def test_ranks_that_need_a_sum_have_it_and_nothing_else_is_sent(seed: int) -> No
     def rank(comm: Comm) -> tuple["np.ndarray", int]:
         me = comm.rank
         slots = np.random.default_rng(me).permutation(NODES).astype(np.int32)
-        """Returns the local numbers of the nodes; the numbers differ between ranks."""
+        """Local numbers of the nodes; the numbers differ between ranks."""
         both = [np.flatnonzero(known[me] & known[other]) for other in range(RANKS)]
         company = SharedSums([Neighbour(k, slots[both[k]]) for k in range(RANKS) if k != me], comm)
         local = np.full(NODES, -1, np.int32)

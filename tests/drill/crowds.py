@@ -44,8 +44,8 @@ SECONDS = 6.0
 P99, WORST = 0.2, 1.0
 """Largest time of a GET request of the two other users at p99, and of the slowest request, s."""
 BUSY, TRIES = 0.02, 3
-"""Delay of a sleeping thread at p99 from which the machine counts as busy, s; largest number of tries on a busy
-machine. Chosen values: a GET request changes threads about ten times.
+"""Delay of a sleeping thread at p99 from which the machine counts as busy, s; largest number of tries on a busy machine
+(chosen values: a GET request changes threads about ten times).
 """
 REST = 2.0
 """Pause after an attack, in which the remaining requests of the attack end, s."""

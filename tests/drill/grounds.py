@@ -19,7 +19,7 @@ FAKETIME = ("/usr/lib/*/faketime/libfaketimeMT.so.1", "/usr/local/lib/faketime/l
 
 
 class Grounds:
-    """Makes stands below a folder."""
+    """The stands of a drill, by their kind, below a folder."""
 
     def __init__(self, place: Path) -> None:
         self._place = place

@@ -37,7 +37,7 @@ def fails(number: int, what: str = "write", every: int = 1) -> Deed:
 
 
 def void(_: object) -> None:
-    """Returns None, so that a lambda with an expression can be a deed."""
+    """Has no effect; the return value None makes a lambda with an expression a deed."""
 
 
 def mend(stand: Stand) -> None:

@@ -185,7 +185,7 @@ def test_tractions_are_those_of_numpy_and_the_same_on_any_number_of_ranks(source
 
 
 def test_facets_below_their_strength_are_no_candidates() -> None:
-    """The result is equal on any number of ranks."""
+    """The broken facets are the same on any number of ranks."""
     mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of(delay=0.0, shear_weight=0.7, friction=0.4)
 
     def strengthened(sim: Simulation) -> Simulation:

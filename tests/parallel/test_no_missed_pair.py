@@ -162,8 +162,8 @@ class Brute(Found):
         return met
 
     def _pairs(self, sides: NearSurface, small: Indices, large: Indices) -> Iterator[Indices]:
-        """Returns (p, 2) all pairs of a node and a face, or of two edges, whose parts may be in contact and that have
-        no common corner.
+        """Yields (p, 2) all pairs of a node and a face, or of two edges, whose parts may be in contact and that have no
+        common corner.
         """
         part, allowed = sides.surface_nodes.part, ~np.isnan(self.contact.searches.mu)
         for begin in range(0, len(small), max(_MOST // max(len(large), 1), 1)):

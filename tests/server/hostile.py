@@ -152,7 +152,7 @@ def _large() -> Iterator[Body]:
 
 
 def _replaced() -> Iterator[Body]:
-    """Returns copies of a valid case with one wrong value: every third combination of a key and a value."""
+    """Yields copies of a valid case with one wrong value: every third combination of a key and a value."""
     places = list(_places(good()))
     wrong = [(place, value) for place in places for value in VALUES]
     for place, value in wrong[::3]:

@@ -101,7 +101,7 @@ class Cluster:
         os.kill(int((self.place / "slurmctld.pid").read_text()), number)
 
     def await_node(self) -> None:
-        """Returns when the node accepts Slurm jobs."""
+        """Waits until the node accepts Slurm jobs."""
         deadline, state = time.monotonic() + _PATIENCE, "unknown"
         while time.monotonic() < deadline:
             with suppress(AssertionError):

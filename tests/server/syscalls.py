@@ -60,7 +60,7 @@ class Filter:
         assert failed in (0, -errno.EDOM, -errno.EFAULT), f"{call}: {failed}"
 
     def deny(self, call: str, *where: tuple[int, int, int, int], code: int = errno.EPERM) -> None:
-        """Returns the action by which the system call fails with ``code``."""
+        """Adds the rule by which the system call fails with ``code``."""
         self.rule(_ERRNO | code, call, *where)
 
     def load(self) -> None:

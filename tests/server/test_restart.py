@@ -186,7 +186,7 @@ def test_a_server_ends_its_runs_on_request(process: MakeProcess, tmp_path: Path)
 
 
 def gone(run: str) -> None:
-    """Returns when all processes of the run have ended."""
+    """Waits until all processes of the run have ended."""
     deadline = time.monotonic() + PATIENCE
     while living(run):
         assert time.monotonic() < deadline

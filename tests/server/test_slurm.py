@@ -313,8 +313,8 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.mark.slow
 @pytest.mark.parametrize(("profile", "jobs"), [("standard", 1), ("pmi2", 1), ("grace", 1), ("gone", 2)])
 def test_a_preempted_run_goes_on_to_the_same_digest(solver: Site, profile: str, jobs: int, uninterrupted: str) -> None:
-    """Slurm requeues the run, the job requeues the run within a grace period, or the job ends for good. After each end
-    of the job another job continues the run.
+    """Slurm requeues the run, the job requeues the run within a grace period, or the job ends without another attempt.
+    After each end of the job another job continues the run.
     """
     run = solver.submit(with_ranks(2, LONG), profile)
     await_progress(solver, run)
@@ -375,7 +375,7 @@ def with_ranks(ranks: int, end_time: str = "1.5 us", threads: int = 1) -> str:
 
 
 def await_progress(solver: Site, run: str) -> None:
-    """Returns when the run has computed some steps."""
+    """Waits until the run has computed some steps."""
     solver.reached(run, 300.0, State.RUNNING)
     deadline = time.monotonic() + 100.0
     while not (solver.ann.show(run)["progress"] or {}).get("step"):
