@@ -31,6 +31,7 @@ from . import adapting, points_table
 from .console import echo, echo_json
 from .options import CaseArgument, Json, Ranks, Threads, Token, Url, aloud, complain, on_cores, show, sweep_named
 from .reports import drawing
+from .sweep_progress import ended, how, standing
 
 SweepArgument = Annotated[
     str,
@@ -180,11 +181,9 @@ def _waited(made: Sweep) -> SweepInfo:
         with aloud(f"sweep {made.id}: waiting for its runs") as name:
 
             def say(info: SweepInfo, point: SweepPoint) -> None:
-                ended = sum(each.run.state.final for each in info.points)
-                name(f"{ended} of {info.total} runs have ended")
-                complain(f"{ended} of {info.total}: {_how(point)}")
+                complain(f"{ended(info)} of {info.total}: {how(point)}")
 
-            return made.wait(say=say)
+            return made.wait(say=say, at=lambda info: name(standing(info)))
     except KeyboardInterrupt:
         complain(
             f"repeat the command to continue; conoid sweep-table {made.id} shows the runs, conoid sweep-cancel "
@@ -205,13 +204,6 @@ def _end(made: Sweep, info: SweepInfo, out: Path | None, *, as_json: bool) -> No
     if failed and info.over:
         complain(failures(failed, info.total))
         raise typer.Exit(1)
-
-
-def _how(point: SweepPoint) -> str:
-    """Returns a text with the values of a point and the end of its run."""
-    values = ", ".join(f"{key} = {value}" for key, value in point.values.items())
-    why = f": {point.run.message or point.run.cause}" if point.run.state is not State.SUCCEEDED else ""
-    return f"{values}: {point.run.state.value}{why}"
 
 
 def failures(failed: list[SweepPoint], total: int) -> str:

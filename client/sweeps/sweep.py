@@ -98,15 +98,19 @@ class Sweep:
         return [Run(self.session, point.run.id) for point in self.status().points]
 
     def wait(
-        self, timeout: float | None = None, say: Callable[[SweepInfo, SweepPoint], None] = lambda info, point: None
+        self,
+        timeout: float | None = None,
+        say: Callable[[SweepInfo, SweepPoint], None] = lambda info, point: None,
+        at: Callable[[SweepInfo], None] = lambda info: None,
     ) -> SweepInfo:
         """Waits until all runs of the sweep have ended. Raises TimeoutError after ``timeout`` s. ``say`` is called
-        with the state of the sweep for each point whose run has ended.
+        with the state of the sweep for each point whose run has ended, ``at`` with every state that was read.
         """
         deadline = math.inf if timeout is None else time.monotonic() + timeout
         announced = set[str]()
         while True:
             info = self.status()
+            at(info)
             for point in info.points:
                 if point.run.state.final and point.run.id not in announced:
                     announced.add(point.run.id)

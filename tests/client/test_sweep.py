@@ -8,10 +8,11 @@ import pytest
 from conoid.cases.load import CaseError
 from conoid.cases.run import State
 from conoid.client.commands import sweeping
+from conoid.client.commands.sweep_progress import standing
 from conoid.client.errors import ClientError
 from conoid.client.remote.run_info import RunInfo
 from conoid.client.sweeps import sweep_plot
-from conoid.client.sweeps.sweep import SweepPoint, listed, points_along, points_in, points_of
+from conoid.client.sweeps.sweep import SweepInfo, SweepPoint, listed, points_along, points_in, points_of
 
 
 def test_keys_go_together_or_each_with_each() -> None:
@@ -148,3 +149,12 @@ def test_a_sweep_that_has_not_succeeded_names_a_run() -> None:
         sweeping.failures(failed, 5) == "2 of 5 runs have not succeeded; r2 (run.ranks = 2) failed: the energy residual"
     )
     assert sweeping.failures(failed[1:], 5) == "1 of 5 runs have not succeeded; r3 (run.ranks = 3) cancelled"
+
+
+def test_the_standing_of_a_sweep_has_the_runs_by_state() -> None:
+    states = {"succeeded": 1, "failed": 1, "running": 2, "queued": 0, "accepted": 1}
+    many = (State(state) for state, n in states.items() for _ in range(n))
+    runs = [RunInfo(id="r", owner="ann", name="a", state=state, ranks=1, submitted=0.0) for state in many]
+    points = [SweepPoint(values={}, run=run) for run in runs]
+    info = SweepInfo(id="1k1h05qxr836bycy2pfs81", name="", submitted=0.0, total=5, states=states, points=points)
+    assert standing(info) == "2 of 5 runs have ended, 2 running, 1 accepted"

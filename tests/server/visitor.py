@@ -66,11 +66,14 @@ class Site:
 
 
 def demo(**changes: str) -> str:
-    """Returns the case of ``make demo`` with regular cuts and other values in some lines."""
+    """Returns the case of ``make demo`` with regular cuts and other values in some lines; a key that the case does not
+    have is added to the table ``run``.
+    """
     text = DEMO_CASE.read_text()
     for name, value in changes.items():
-        old = next(line for line in text.splitlines() if line.startswith(f"{name} = "))
-        text = text.replace(old, f"{name} = {value}")
+        old = next((line for line in text.splitlines() if line.startswith(f"{name} = ")), "")
+        new = f"{name} = {value}"
+        text = text.replace(old, new, 1) if old else text.replace("[run]", f"[run]\n{new}", 1)
     return text + CUTS
 
 
