@@ -13,6 +13,7 @@ from ..model.solids import Measured
 from ..reading.problems import Location, Problem, problem
 from ..reading.similar import choices, nearest
 from ..shapes.geometry import Vector, index, lowest_along
+from ..shapes.images import mirrors
 from ..shapes.loaded import near
 from ..shapes.placed import Placed
 from ..shapes.region import GENERATED
@@ -206,8 +207,18 @@ def check_walls(case: Case) -> Iterator[Problem]:
         seen.add(wall.name)
         yield from _shape(wall, ("boundaries", i))
         yield from _course(wall, ("boundaries", i))
+        yield from _off_mirrors(case, wall, ("boundaries", i))
         if wall.normal is not None and any(wall.normal) and wall.shape == "plane":
             yield from _behind(case, i, wall.point, wall.normal, wall.parts)
+
+
+def _off_mirrors(case: Case, wall: Wall, location: Location) -> Iterator[Problem]:
+    """Yields a problem for a free wall that a plane of symmetry maps to itself, and that moves across the plane."""
+    for number, plane in mirrors(case, wall) if wall.mass is not None else ():
+        d = index(plane.axis)
+        if wall.velocity[d]:
+            message = f"the plane of symmetry boundaries[{number}] cuts this wall, which cannot move across it; use 0"
+            yield problem((*location, "velocity", d), f"{wall.velocity[d]:g} m/s", message)
 
 
 def _shape(wall: Wall, location: Location) -> Iterator[Problem]:

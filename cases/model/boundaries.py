@@ -62,8 +62,9 @@ class Wall(Model):
     """Factor of ``velocity`` over time, as pairs of time and factor (see ``kind = "velocity"``). The key ``course``
     must not be combined with ``mass``."""
     mass: Annotated[Mass, Field(gt=0)] | None = None
-    """Mass of a wall that moves freely: only the impulses of the bodies change its velocity. Default: the wall has no
-    mass, and its velocity is prescribed."""
+    """Mass of a wall that moves freely: only the impulses of the bodies change its velocity. If planes of symmetry cut
+    the wall, the mass is that of the modelled part of the wall, and the wall does not move across these planes.
+    Default: the wall has no mass, and its velocity is prescribed."""
     parts: tuple[Name, ...] = ()
     """Names of the parts that the wall stops; all parts if empty."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0

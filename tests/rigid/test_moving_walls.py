@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from conoid.cases.checks.boundary_checks import check_walls
 from conoid.cases.messages import Energy
 from conoid.cases.model import schema
 from conoid.cases.model.materials import Elastic, Material
@@ -173,3 +174,43 @@ def test_a_wall_with_a_mass_is_the_same_on_any_number_of_ranks() -> None:
     alone = on(1, case, [BAR], ended)
     assert on(3, case, [BAR], ended) == alone * 3
     assert len(alone[0]) == 48
+
+
+BALL: dict[str, Any] = {"kind": "wall", "shape": "sphere", "radius": 5e-3, "friction": 0.3}
+MIRRORS = schema.Symmetry(kind="symmetry", axis="x"), schema.Symmetry(kind="symmetry", axis="y")
+
+
+@pytest.mark.parametrize("rigid", [None, schema.Rigid()], ids=["deformable", "rigid"])
+@pytest.mark.parametrize("cut", [True, False])
+def test_a_wall_that_planes_of_symmetry_cut_stays_on_them(rigid: schema.Rigid | None, *, cut: bool) -> None:
+    """The bar is a quarter that hits a quarter of a sphere: the other quarters push the sphere back to the axis.
+    Without the planes the bar pushes the sphere aside.
+    """
+    ball = schema.Wall(**BALL, point=(0.0, 0.0, -5.01e-3), mass=0.3 * MASS)
+    case = scene(THIN, end=3e-6, velocity=(0.0, 0.0, -20.0), boundaries=(*(MIRRORS if cut else ()), ball))
+    case = case.model_copy(update={"parts": (case.parts[0].model_copy(update={"rigid": rigid}),)})
+    residuals: list[float] = []
+    sim = run(build(case, [BAR]), lambda sim, v: residuals.append(sim.ledger.close(v).residual))
+    assert max(residuals) < 1e-3
+    assert sim.ledger.momentum[2] == pytest.approx(-20.0 * MASS, rel=1e-12)
+    x, y, z = sim.walls.speed[0]
+    assert z < -1.0
+    assert (x == y == 0.0) if cut else (x < -1e-3 and y < -1e-3)
+
+
+def test_a_free_wall_must_not_move_across_a_plane_of_symmetry_that_cuts_it() -> None:
+    """The plane acts on all parts that the wall stops; a wall beside the plane has a mirror image, and may move."""
+    across, beside = (
+        schema.Wall(**(PLANE | {"normal": normal}), mass=1.0, velocity=(3.0, 0.0, 2.0))
+        for normal in ((0.0, 0.0, 1.0), (1.0, 0.0, 1.0))
+    )
+    case = scene(THIN, end=1e-6)
+    found, none = (
+        [str(each) for each in check_walls(case.model_copy(update={"boundaries": (*MIRRORS, wall)}))]
+        for wall in (across, beside)
+    )
+    assert found == [
+        "boundaries[2].velocity[0] = '3 m/s': the plane of symmetry boundaries[0] cuts this wall, which cannot move "
+        "across it; use 0"
+    ]
+    assert none == []

@@ -125,7 +125,8 @@ class MovingWalls(Stopping):
                 if not sums[:3].any():
                     break
                 impulse = np.array([float(word) for word in sums[:3]]) / self.scale
-                change = solved(sums[3:9] / self._weight, mass, -(mass * (speed - start) + impulse))
+                right = np.where(walls.held[k], 0.0, -(mass * (speed - start) + impulse))
+                change = solved(np.where(_paired(walls.held[k]), 0.0, sums[3:9] / self._weight), mass, right)
                 speed += change
                 if np.abs(change).max() <= _ENOUGH * np.abs(speed).max():
                     break
@@ -134,7 +135,7 @@ class MovingWalls(Stopping):
             if not sums[:3].any():
                 return False
         sums = self._sum(state, k, speed, dt, gives=True)
-        walls.speed[k] = start - walls.lightness[k] * (sums[:3] / self.scale)
+        walls.speed[k] = start - walls.light[k] * (sums[:3] / self.scale)
         return bool(sums[:3].any())
 
     def _sum(self, state: Nodes, k: int, speed: Floats, dt: float, *, gives: bool) -> Ints:
@@ -174,6 +175,12 @@ def solved(derivative: Floats, mass: float, right: Floats) -> Floats:
     whole = xx * a + xy * b + zx * c
     p, q, r = (float(value) for value in right)
     return np.array([a * p + b * q + c * r, b * p + d * q + e * r, c * p + e * q + f * r]) / whole
+
+
+def _paired(held: Flags) -> Flags:
+    """(6,) True for the components xx, yy, zz, yz, zx, xy of a tensor with a ``held`` (3,) axis."""
+    x, y, z = held.tolist()
+    return np.array([x, y, z, y or z, z or x, x or y])
 
 
 _F, _I, _B = types.float64, types.int64, types.boolean

@@ -7,7 +7,7 @@ import numpy as np
 from conoid.cases.model.boundaries import Wall
 
 from ..kernels.jit import njit, record, types
-from ..model.state import Floats, Ints
+from ..model.state import Flags, Floats, Ints
 from .course import Course
 
 PLANE, CYLINDER, SPHERE = range(3)
@@ -36,8 +36,15 @@ SHAPES = record(Shapes, types.int64[::1], _F2, _F2, _F1, _F1)
 class Walls:
     """Walls of a case with their motion. All ranks have equal values."""
 
-    def __init__(self, specs: list[Wall]) -> None:
+    def __init__(self, specs: list[Wall], held: Flags | None = None) -> None:
+        """``held`` (w, 3): components of the velocity that planes of symmetry hold, of the first walls; none without
+        ``held``.
+        """
         n = len(specs)
+        self.held = np.zeros((n, 3), bool)
+        """(w, 3) True for components of the velocity that planes of symmetry hold."""
+        if held is not None:
+            self.held[: len(held)] = held
         axis = np.array([each.normal or each.axis or (0.0, 0.0, 1.0) for each in specs]).reshape(n, 3)
         squares = axis * axis
         axis = axis / np.sqrt((squares[:, 0] + squares[:, 1]) + squares[:, 2])[:, None]
@@ -55,6 +62,8 @@ class Walls:
         self.mass = np.array([each.mass or np.inf for each in specs])
         """(w,) mass of each wall, kg; infinite for a fixed or driven wall."""
         self.lightness = np.array([0.0 if each.mass is None else 1.0 / each.mass for each in specs])
+        self.light = np.where(self.held, 0.0, self.lightness[:, None])
+        """(w, 3) 1 / mass of each wall, 1/kg; 0 for a component of its velocity that does not change."""
         self.plain = np.array([each.plain for each in specs], bool)
         """(w,) True for walls that are fixed planes."""
         self.speed = np.array([self._driven(k, 0.0, 0.0) for k in range(n)]).reshape(n, 3)

@@ -115,7 +115,7 @@ class BodyStops:
             walls = self.walls
             press(
                 self._all, self._many, speed, rate, self._bodies.lightness, self._bodies.yielding, walls.speed,
-                walls.lightness, walls.friction, self.impulse, self.rubbed, self.of_walls, self.rubbed_by,
+                walls.lightness, walls.light, walls.friction, self.impulse, self.rubbed, self.of_walls, self.rubbed_by,
             )  # fmt: skip
 
     def _rebound(self, speed: Floats, rate: Floats) -> None:
@@ -185,20 +185,21 @@ def find(rows, shapes, held, arms, body, rotation, centre, near, dt):  # type: i
 
 
 @njit(
-    types.void(ROWS, types.int64, _F2, _F2, _F2, _F3, _F2, _F1, _F1, _F2, _F2, _F3, _F3),
+    types.void(ROWS, types.int64, _F2, _F2, _F2, _F3, _F2, _F1, _F2, _F1, _F2, _F2, _F3, _F3),
     cache=True,
     error_model="numpy",
 )
 def press(  # type: ignore[no-untyped-def]
-    rows, many, speed, rate, lightness, yielding, wall_speed, wall_lightness, friction, impulse, rubbed, given, by
-):
+    rows, many, speed, rate, lightness, yielding, wall_speed, wall_lightness, light, friction, impulse, rubbed, given,
+    by,
+):  # fmt: skip
     """Passes over the rows until the impulses have converged.
 
     Adds the impulses to ``impulse`` (b, 6) and ``given`` (walls, b, 3), and the impulses of friction also to ``rubbed``
     and ``by``.
 
     1. Velocity u of the node relative to the wall.
-    2. Compliance along n of body and wall: 1 / m + (r x n) . I^-1 (r x n) + 1 / M.
+    2. Compliance along n of body and wall: 1 / m + (r x n) . I^-1 (r x n) + 1 / M; with ``light`` (walls, 3) for 1 / M.
     3. Normal impulse: changed by (least - u . n) / compliance, and not below zero.
     4. Friction: u again, without its normal part, over a bound of the compliance across n; the sum of the step is
        limited to mu p.
@@ -219,6 +220,7 @@ def press(  # type: ignore[no-untyped-def]
             gives, along = wall_lightness[w], 0.0
             for i in range(3):
                 gives += lightness[b, i] * rows.normal[r, i] * rows.normal[r, i]
+                gives -= (wall_lightness[w] - light[w, i]) * rows.normal[r, i] * rows.normal[r, i]
                 along += rows.normal[r, i] * slip[i]
                 for j in range(3):
                     gives += turn[i] * yielding[b, i, j] * turn[j]
@@ -231,7 +233,7 @@ def press(  # type: ignore[no-untyped-def]
             largest, moved = max(largest, push), max(moved, abs(more))
             for i in range(3):
                 change[i] = more * rows.normal[r, i]
-            _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, wall_lightness, impulse, given)
+            _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, light, impulse, given)
             if friction[w] == 0.0 or (push == 0.0 and more == 0.0):
                 continue
             # 4. Compute the friction.
@@ -253,7 +255,7 @@ def press(  # type: ignore[no-untyped-def]
                 change[i] = share * slip[i] - rows.rub[r, i]
                 rows.rub[r, i] = share * slip[i]
                 moved = max(moved, abs(change[i]))
-            _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, wall_lightness, impulse, given)
+            _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, light, impulse, given)
             for i in range(3):
                 rubbed[b, i] += change[i]
                 by[w, b, i] += change[i]
@@ -264,8 +266,8 @@ def press(  # type: ignore[no-untyped-def]
             break
 
 
-@njit(types.void(types.int64, types.int64, _F, _F, _F, _F1, _F2, _F2, _F2, _F3, _F2, _F1, _F2, _F3), cache=True)
-def _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, wall_lightness, impulse, given):  # type: ignore[no-untyped-def]
+@njit(types.void(types.int64, types.int64, _F, _F, _F, _F1, _F2, _F2, _F2, _F3, _F2, _F2, _F2, _F3), cache=True)
+def _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, light, impulse, given):  # type: ignore[no-untyped-def]
     """Applies the impulse ``change`` (3,), N s, of a wall to a body, at the arm x, y, z."""
     p, q, s = change[0], change[1], change[2]
     t, u, v = y * s - z * q, z * p - x * s, x * q - y * p
@@ -277,4 +279,4 @@ def _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, w
         given[w, b, i] += change[i]
         speed[b, i] += lightness[b, i] * change[i]
         rate[b, i] += yielding[b, i, 0] * t + yielding[b, i, 1] * u + yielding[b, i, 2] * v
-        wall_speed[w, i] -= wall_lightness[w] * change[i]
+        wall_speed[w, i] -= light[w, i] * change[i]

@@ -4,6 +4,7 @@ import numpy as np
 
 from conoid.cases.checks.on import bits
 from conoid.cases.model import schema
+from conoid.cases.shapes.images import mirrors
 
 from ..boundaries.boundaries import Boundary, SymmetryPlane, driven, mirrored
 from ..boundaries.course import Course
@@ -40,11 +41,15 @@ def walls_of(case: schema.Case) -> Walls:
 
     If the case has rigid parts, each symmetry plane adds two walls: one for bodies above the plane and one for bodies
     below it. A contact between a rigid body and the wall of a symmetry plane represents the contact between the body
-    and its mirror image.
+    and its mirror image. A free wall that a plane of symmetry maps to itself does not move across the plane.
     """
     planes = case.boundaries_of(schema.Symmetry) if case.rigid else []
     images = [_image(spec, sign) for _, spec in planes for sign in (1.0, -1.0)]
-    return Walls([*(spec for _, spec in case.boundaries_of(schema.Wall)), *images])
+    walls = [spec for _, spec in case.boundaries_of(schema.Wall)]
+    held = np.zeros((len(walls), 3), bool)
+    for k, wall in enumerate(walls):
+        held[k, [AXES[plane.axis] for _, plane in mirrors(case, wall) if wall.mass is not None]] = True
+    return Walls([*walls, *images], held)
 
 
 def _image(plane: schema.Symmetry, sign: float) -> schema.Wall:

@@ -83,7 +83,8 @@ def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary]
     indices = [index for index, _ in case.boundaries_of(schema.Wall)]
     for walls in boundaries:
         if isinstance(walls, RigidWalls | MovingWalls):
-            for index, depth in zip(indices, comm.maximum(walls.depths(model.nodes)), strict=True):
+            depths = comm.maximum(walls.depths(model.nodes))[: len(indices)]  # images of planes of symmetry follow
+            for index, depth in zip(indices, depths, strict=True):
                 if depth > GENERATED * model.size:
                     raise InputError(f"boundaries[{index}]: a body starts {depth:.3g} m behind this wall")
 
