@@ -74,7 +74,7 @@ class ErosionAccount:
         """
         owned = leaving[state.owned[leaving]]
         after, mass = state.v[owned], state.mass[owned]
-        early = self._clock.shorter / state.scale * (before * state.force[leaving]).sum(axis=1)
+        early = self._clock.shorter / state.scale * (before * state.force[leaving, :3]).sum(axis=1)
         state.stepping[leaving] -= early
         before = before[state.owned[leaving]]
         energy = 0.5 * mass * (before * after).sum(axis=1) + early[state.owned[leaving]]

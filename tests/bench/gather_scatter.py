@@ -32,7 +32,7 @@ class GatherScatter:
 
     def __init__(self, sim: Simulation) -> None:
         nodes = sim.model.nodes
-        self._x, self._v, self.force = nodes.x.copy(), nodes.v.copy(), np.zeros_like(nodes.force)
+        self._x, self._v, self.force = nodes.x.copy(), nodes.v.copy(), np.zeros((nodes.n, 3), np.int64)
         self._tets = [block.tets for block in sim.model.blocks]
 
     def sweeps(self, count: int) -> float:

@@ -69,7 +69,7 @@ def held_force(sim: Simulation, drive: Drive, ramp: float, direction: Floats) ->
 
     def look(sim: Simulation, before: Floats) -> None:
         if sim.clock.t > ramp:
-            seen.append(float((sim.model.nodes.force[drive.nodes] / sim.scale * direction).sum()))
+            seen.append(float((sim.model.nodes.force[drive.nodes, :3] / sim.scale * direction).sum()))
 
     sim.boundaries.append(drive)
     run(sim, look)

@@ -179,7 +179,7 @@ class Patch:
     @property
     def force(self) -> Floats:
         """Returns the (nodes, 3) sums of the internal forces, N."""
-        return np.asarray(self.nodes.force / self._used)
+        return np.asarray(self.nodes.force[:, :3] / self._used)
 
     @property
     def quantum(self) -> float:

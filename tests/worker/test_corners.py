@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from conoid.worker.elements import tet4
+from conoid.worker.elements.forces import scatter_forces
 from conoid.worker.elements.scratch import EDGE, MOVED, RATE, SCRATCH
-from conoid.worker.model.state import CHUNK, Floats, Tets
+from conoid.worker.model.state import CHUNK, Floats, Tets, force_table
 
 COUNTS = (1, 3, 4, 7, 257, CHUNK)
 
@@ -44,3 +45,18 @@ def test_displacements_are_the_edges_less_their_initial_values(n: int) -> None:
     assert (rows[EDGE // CHUNK : EDGE // CHUNK + 9, :n] == now).all()
     assert (rows[MOVED // CHUNK : MOVED // CHUNK + 9, :n] == now - differences(x0, tets)).all()
     assert np.isfinite(w).sum() == 18 * n
+
+
+@pytest.mark.parametrize("n", COUNTS)
+def test_forces_of_tets_are_added_at_their_nodes(n: int) -> None:
+    """Node 0 gets minus the sum of the other forces; the last column of the table stays zero."""
+    x0, _, tets = mesh(n)
+    random = np.random.default_rng(n)
+    quanta, before = random.integers(-(2**50), 2**50, (9, CHUNK)), random.integers(-(2**60), 2**60, x0.shape)
+    force, expected = force_table(before), before.copy()
+    scatter_forces(force, quanta.reshape(-1), tets, n)
+    others = quanta[:, :n].T.reshape(n, 3, 3)
+    for corner, more in enumerate((-others.sum(axis=1), *others.transpose(1, 0, 2))):
+        np.add.at(expected, tets[:, corner], more)
+    assert (force[:, :3] == expected).all()
+    assert not force[:, 3].any()

@@ -26,6 +26,8 @@ FOUR = 4
 _AXES, _CORNERS = 3, 4
 _WORD, _INDEX = ir.IntType(64), ir.IntType(32)
 _VECTOR = ir.VectorType(ir.DoubleType(), FOUR)
+_QUANTA = ir.VectorType(_WORD, FOUR)
+_POINTER = _QUANTA.as_pointer()
 _MASK = ir.VectorType(ir.IntType(1), FOUR)
 _NUMBER = 8
 """Bytes of a number; vectors in memory need no larger alignment."""
@@ -105,7 +107,45 @@ def _gather_moved(_: Any, w: Any, x0: Any, x: Any, tets: Any, i: Any) -> Any:
     return types.void(w, x0, x, tets, i), emit
 
 
+def _columns(builder: Any, rows: Any, first: int, i: Any) -> Vectors:
+    """Returns the vectors (x, y, z, 0) of four tets, from three rows of integers; the first row begins at ``first``."""
+    x, y, z = (
+        builder.load(builder.bitcast(builder.gep(rows, [builder.add(i, _WORD(first + axis * CHUNK))]), _POINTER))
+        for axis in range(_AXES)
+    )
+    for each in (x, y, z):
+        each.align = _NUMBER
+    zeros = ir.Constant(_QUANTA, [0] * FOUR)
+    low = [_shuffled(builder, *pair, 0, 4, 2, 6) for pair in ((x, y), (z, zeros))]
+    high = [_shuffled(builder, *pair, 1, 5, 3, 7) for pair in ((x, y), (z, zeros))]
+    return [_shuffled(builder, *some, *places) for places in ((0, 1, 4, 5), (2, 3, 6, 7)) for some in (low, high)]
+
+
+def _add(builder: Any, force: Any, node: Any, more: Any) -> None:
+    """Adds a vector to the row of a node in a table (nodes, 4)."""
+    place = builder.bitcast(builder.gep(force, [builder.mul(node, _WORD(FOUR))]), _POINTER)
+    sums = builder.load(place)
+    sums.align = _NUMBER
+    builder.store(builder.add(sums, more), place).align = _NUMBER
+
+
+def _add_forces(_: Any, force: Any, wi: Any, tets: Any, i: Any) -> Any:
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        force, wi, tets = (_data(context, builder, signature.args[k], args[k]) for k in range(3))
+        of_corners = [_columns(builder, wi, _AXES * corner * CHUNK, args[3]) for corner in range(_CORNERS - 1)]
+        zeros = ir.Constant(_QUANTA, [0] * FOUR)
+        for k, (first, second, third) in enumerate(zip(*of_corners, strict=True)):
+            opposite = builder.sub(zeros, builder.add(builder.add(first, second), third))
+            for corner, more in enumerate((opposite, first, second, third)):
+                _add(builder, force, _corner(builder, tets, builder.add(args[3], _WORD(k)), corner), more)
+        return context.get_dummy_value()
+
+    return types.void(force, wi, tets, i), emit
+
+
 gather: Any = intrinsic(_gather)
 """Function for kernels; it does for the four tets from ``i`` on what ``tet4.gather`` does for a chunk."""
 gather_moved: Any = intrinsic(_gather_moved)
 """Function for kernels; it does for the four tets from ``i`` on what ``tet4.gather_moved`` does for a chunk."""
+add_forces: Any = intrinsic(_add_forces)
+"""Function for kernels; it does for the four tets from ``i`` on what ``forces.scatter_forces`` does for a chunk."""

@@ -11,6 +11,8 @@ from ..kernels.jit import njit
 from ..materials.elementary import NEAREST
 from ..model.rows import PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, VISCOUS
 from ..model.state import CHUNK
+from . import corners
+from .corners import FOUR
 from .scratch import EDGE
 
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
@@ -88,14 +90,16 @@ def internal_forces(wi, w, s, n, scale):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], int64[::1], uint32[:, ::1], int64)", cache=True)
 def scatter_forces(force, wi, tets, n):  # type: ignore[no-untyped-def]
-    """Adds the forces, in quanta, to the nodal sums. Node 0 gets minus the sum of the other three forces, so that the
-    four forces of a tet add up to exactly zero.
+    """Adds the forces, in quanta, to the nodal sums (nodes, 4). Node 0 gets minus the sum of the other three forces, so
+    that the four forces of a tet add up to exactly zero.
     """
-    first, second, third = wi, wi[3 * CHUNK :], wi[6 * CHUNK :]
-    for i in range(n):
+    whole = n // FOUR * FOUR
+    for i in range(0, whole, FOUR):
+        corners.add_forces(force, wi, tets, i)
+    for i in range(whole, n):
         a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
         for k in range(3):
-            f1, f2, f3 = first[k * CHUNK + i], second[k * CHUNK + i], third[k * CHUNK + i]
+            f1, f2, f3 = wi[k * CHUNK + i], wi[(3 + k) * CHUNK + i], wi[(6 + k) * CHUNK + i]
             force[b, k] += f1
             force[c, k] += f2
             force[d, k] += f3

@@ -29,7 +29,7 @@ class Motion(NamedTuple):
     v: Floats
     """(nodes, 3) velocities at n+1/2, m/s."""
     force: Ints
-    """(nodes, 3) sums of forces, quanta."""
+    """(nodes, 4) sums of forces, quanta (model/state.py)."""
 
 
 class Body(NamedTuple):

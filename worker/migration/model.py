@@ -9,7 +9,7 @@ from conoid.cases.model.schema import MOST_PARTS, Case
 
 from ..model.ids import located
 from ..model.shares import Shares, ranks
-from ..model.state import CHUNK, Bits, Block, Indices, Ints, Model, Nodes, Tets
+from ..model.state import CHUNK, Bits, Block, Indices, Ints, Model, Nodes, Tets, force_table
 from ..parallel.comm import Comm
 from ..scene import domain
 from .parcel import Parcel, Table, length, take
@@ -29,6 +29,7 @@ def keep(model: Model, case: Case) -> Parcel:
         "slack": model.slack, "rounding": model.rounding, "groups": model.groups, "scale": nodes.scale,
     }  # fmt: skip
     columns = {name: getattr(nodes, name) for name in (*_NODAL, *(["marks"] if ons(case) else []))}
+    columns["force"] = nodes.force[:, :3]
     tets = {b.part: _keep_block(b, nodes.id) for b in model.blocks if b.n}
     return Parcel(known, {}, columns, tets, _keep_shares(nodes) if len(nodes.shares.rank) else {})
 
@@ -63,6 +64,7 @@ def resume(case: Case, arrived: Arrived, comm: Comm) -> Model:
     values: dict[str, Any] = {
         name: np.ascontiguousarray(parcel.nodes[name]) for name in (*_NODAL, "marks") if name in parcel.nodes
     }
+    values["force"] = force_table(values["force"])
     nodes = Nodes(owner=arrived.owner, owned=arrived.owner == comm.rank, scale=known["scale"], **values)
     nodes.shares = _resume_shares(case, parcel, nodes)
     blocks = []

@@ -1,7 +1,10 @@
 """Tables in which each row is a cache line, so that a kernel reads a row in one memory access."""
 
+from typing import cast
+
 import numpy as np
 
+from .growing import aligned
 from .state import Floats
 
 LINE = 8
@@ -10,6 +13,4 @@ LINE = 8
 
 def cache_lines(n: int) -> Floats:
     """Return an uninitialised (n, LINE) array whose rows are aligned to cache lines."""
-    room = np.empty(n * LINE + LINE)
-    first = -(room.ctypes.data // room.itemsize) % LINE
-    return room[first : first + n * LINE].reshape(n, LINE)
+    return cast("Floats", aligned(n, (LINE,), np.float64))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .growing import address_of, spare
+from .growing import address_of, aligned, same_memory, spare
 
 
 class Rule(IntFlag):
@@ -88,7 +88,7 @@ class Columns:
                     array, room = columns[name], rooms[k]
                     if room is None and not len(array):
                         continue
-                    if room is None or array.base is not room or len(array) != n or len(room) < m:
+                    if room is None or len(array) != n or len(room) < m or not same_memory(room[:n], array):
                         self._set(k, room := _room(array, n, m, name))
                     if room is not None:
                         columns[name] = room[:m]
@@ -119,7 +119,7 @@ def _room(array: "np.ndarray", n: int, m: int, name: str) -> "np.ndarray | None"
             raise ValueError(f"column {name!r} has {len(array)} rows instead of {n}")
         return None
     if (room := spare(array, m)) is None:
-        room = np.empty((m + m // 2, *array.shape[1:]), array.dtype)
+        room = aligned(m + m // 2, array.shape[1:], array.dtype)
         room[:n] = array
     return room
 

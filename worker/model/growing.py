@@ -45,6 +45,19 @@ class Scratch:
         return some
 
 
+_LINE = 64
+"""Bytes of a cache line. A table whose rows are whole cache lines, or equal parts of one, begins on a cache line."""
+
+
+def aligned(n: int, columns: tuple[int, ...], kind: Any) -> Any:
+    """Return an uninitialised (n, *columns) array that begins on a cache line."""
+    dtype = np.dtype(kind)
+    size = n * int(np.prod(columns, dtype=np.int64)) * dtype.itemsize
+    room = np.empty(size + _LINE, np.uint8)
+    first = -address_of(room) % _LINE
+    return room[first : first + size].view(dtype).reshape(n, *columns)
+
+
 def spacious(n: int, columns: tuple[int, ...], kind: Any) -> Any:
     """Return an uninitialised (n, *columns) array in a buffer with spare rows (columns.py)."""
     return np.empty((n + n // 2, *columns), kind)[:n]

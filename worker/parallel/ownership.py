@@ -39,14 +39,14 @@ def ranks(owners: Indices | Ints) -> list[int]:
 @njit("void(int64[:, ::1], int32[::1], int64[:, ::1])", cache=True)
 def _pack(buffer, nodes, sums):  # type: ignore[no-untyped-def]
     for i in range(len(nodes)):
-        for k in range(sums.shape[1] if nodes[i] >= 0 else 0):
+        for k in range(buffer.shape[1] if nodes[i] >= 0 else 0):
             buffer[i, k] = sums[nodes[i], k]
 
 
 @njit("void(int64[:, ::1], int32[::1], int64[:, ::1])", cache=True)
 def _add(sums, nodes, buffer):  # type: ignore[no-untyped-def]
     for i in range(len(nodes)):
-        for k in range(sums.shape[1] if nodes[i] >= 0 else 0):
+        for k in range(buffer.shape[1] if nodes[i] >= 0 else 0):
             sums[nodes[i], k] += buffer[i, k]
 
 
@@ -59,7 +59,7 @@ def complete(comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: Tag) -> N
 
 
 class SharedSum:
-    """Completion of nodal sums, (nodes, ``columns``) int64, that can be repeated."""
+    """Completion of the first ``columns`` columns of nodal sums, int64, that can be repeated."""
 
     def __init__(
         self, comm: Comm, neighbours: list[Neighbour], columns: int, tag: Tag, *, headed: bool = False

@@ -25,7 +25,7 @@ from ..materials import models
 from ..model.loads import Load, LoadedFaces
 from ..model.rows import MASS
 from ..model.shares import Shares
-from ..model.state import CHUNK, Block, Flags, Floats, Indices, Ints, Model, Nodes, Tets, chunked
+from ..model.state import CHUNK, Block, Flags, Floats, Indices, Ints, Model, Nodes, Tets, chunked, force_table
 from ..parallel.comm import Comm, SerialComm
 from ..parallel.decompose import bisect
 from ..parallel.ownership import Neighbour
@@ -194,7 +194,7 @@ def alone(case: schema.Case, whole: Whole) -> tuple[Model, Piece]:
 def _model(case: schema.Case, piece: Piece) -> Model:
     nodes = Nodes(
         id=piece.node_ids, part=piece.node_part, owner=piece.node_owner, owned=piece.owned, x0=piece.points.copy(),
-        x=piece.points, v=piece.velocity, mass=piece.mass, force=np.zeros(piece.points.shape, np.int64),
+        x=piece.points, v=piece.velocity, mass=piece.mass, force=force_table(len(piece.points)),
         stepping=np.zeros(len(piece.mass)),
         group=piece.node_group, marks=piece.marks, shares=piece.shares,
     )  # fmt: skip
