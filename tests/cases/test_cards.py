@@ -86,7 +86,6 @@ def test_a_card_is_read_equally_in_every_format(tmp_path: Path, keyword: str, ca
         ("*NODE\n" + " " * 75 + "7\n", "line 2: '7' is behind the last field, beyond column 72"),
         ("*NODE\n      &n\n", "line 2: the parameter '&n' is not defined above; known: none"),
         ("*PARAMETER\nR a, 1\nR a, 2\n", "line 3: the parameter 'a' has another value above"),
-        ("*PARAMETER_EXPRESSION\nR a, 1+1\n", "line 1: *PARAMETER_EXPRESSION is not supported"),
         ("*INCLUDE_TRANSFORM\na.k\n", "line 1: *INCLUDE_TRANSFORM is not supported"),
         ("*NODE extra\n", "line 1: 'extra' is behind *NODE"),
         ("*\n", "line 1: '*' is no keyword"),

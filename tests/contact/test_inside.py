@@ -58,7 +58,7 @@ def test_a_node_below_the_outermost_tets_counts_as_inside() -> None:
     assert found.buried > 0
     [line] = found.warnings
     assert line.startswith(f"{found.nodes} of {found.tested} nodes are inside of other bodies")
-    assert f"{found.buried} of them through the outermost tets" in line
+    assert f"{found.buried} of them deeper than the outermost tets" in line
 
 
 @pytest.mark.parametrize(("depth", "buried"), [(0.025 * SIZE, False), (0.1 * SIZE, True)])

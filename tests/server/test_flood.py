@@ -36,6 +36,9 @@ def ann(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[User]:
         server = _Server(service)
         thread = threading.Thread(target=server.run, args=([listener],))
         thread.start()
+        while not server.started:
+            assert thread.is_alive()
+            time.sleep(0.01)
         token = create_token(service.store, "ann", frozenset({"read", "submit"}))
         url = f"http://127.0.0.1:{listener.getsockname()[1]}"
         headers = {"Authorization": f"Bearer {token}"}

@@ -213,7 +213,7 @@ def test_an_adaptive_sweep_is_seen_as_it_is_reported(site: Site, page: Page) -> 
     page.wait(f"{ROWS} > 5")
     page.slide("select[aria-label=groups]", "sweep")
     page.wait("document.querySelector('.runs .group .note')?.innerText.endsWith('velocity z 410 ± 5 m/s')")
-    assert page.text(".runs .group .note").startswith("probe.left = 0 m/s at parts[0]")
+    assert page.text(".runs .group .note").startswith("probe.left = 0 m/s at part 1 velocity z")
     page.slide("select[aria-label=groups]", "")
 
 

@@ -79,7 +79,7 @@ def test_without_self_contact_it_passes_and_is_counted() -> None:
     found = look(sim.contact, sim.model, None, SerialComm())
     assert (found.nodes, found.own) == (1, 1)
     [line] = found.warnings
-    assert "1 of them, without tets, into the part that they come from" in line
+    assert "1 of them, which have no tets, in the part that they come from" in line
 
 
 @pytest.mark.parametrize(
