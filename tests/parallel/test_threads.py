@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conoid.worker.elements.colours import coloured
+from conoid.worker.elements.colours import coloured, joined
 from conoid.worker.kernels.jit import njit, several, types
 from conoid.worker.mesh.structured import structured
 from conoid.worker.model.state import CHUNK, Block
@@ -135,6 +135,32 @@ def test_chunks_of_one_colour_share_no_node_and_every_chunk_has_one() -> None:
             assert owners.max() == 1
     assert len(found.starts) - 1 < block.chunks - 5
     assert len(found.starts) - 1 <= 20
+
+
+def test_chunks_of_one_colour_share_no_node_over_several_blocks() -> None:
+    """The second block shares the nodes of a face with the first one."""
+    mesh = structured(box(20_000, "structured"))
+    parts = mesh.tets[: 30 * CHUNK + 100], mesh.tets[30 * CHUNK + 100 :]
+    none = np.zeros((0, 0, 0)), 0, 0, np.zeros(0)
+    blocks = [Block(k, len(each), each.astype(np.uint32), np.arange(len(each)), *none) for k, each in enumerate(parts)]
+    found, many = joined(blocks, len(mesh.points)), [block.chunks for block in blocks]
+    assert sorted(map(tuple, found.tasks.tolist())) == [(c, c + 1) for c in range(sum(many))]
+    tets = [each[c * CHUNK : (c + 1) * CHUNK] for each in parts for c in range(-(-len(each) // CHUNK))]
+    for first, last in zip(found.starts[:-1], found.starts[1:], strict=True):
+        owners = np.zeros(len(mesh.points), np.int64)
+        for c, _ in found.tasks[first:last]:
+            owners[np.unique(tets[c])] += 1
+        assert owners.max() == 1
+    assert len(found.starts) - 1 <= 20
+
+
+def test_chunks_of_several_blocks_that_share_a_node_have_a_colour_each() -> None:
+    n = 40 * CHUNK
+    tets = np.column_stack([np.zeros(n), *(np.arange(n) * 3 + k for k in (1, 2, 3))]).astype(np.uint32)
+    blocks = [Block(k, n, tets, np.arange(n), np.zeros((0, 0, 0)), 0, 0, np.zeros(0)) for k in range(3)]
+    found = joined(blocks, 3 * n + 1)
+    assert np.diff(found.starts).max() == 1
+    assert found.tasks[:, 0].tolist() == list(range(120))
 
 
 def test_chunks_that_all_share_a_node_have_a_colour_each() -> None:

@@ -65,6 +65,22 @@ def coloured(block: Block, begin: int, end: int, nodes: int) -> Coloured:
     return Coloured(tasks, np.searchsorted(colour[order], np.arange(colour.max(initial=-1) + 2)))
 
 
+def joined(blocks: list[Block], nodes: int) -> Coloured:
+    """Returns the chunks of several blocks as tasks of one chunk each. The chunks are numbered over all blocks; chunks
+    of one colour share no node, also if they belong to different blocks. ``nodes``: number of nodes of the rank.
+    """
+    used, colours, before = np.zeros(nodes, np.int64), [], 0
+    for block in blocks:
+        colour = np.zeros(block.chunks, np.int64)
+        _give(block.tets[: block.n], 0, block.chunks, used, colour)
+        colour[colour >= _BITS] += before
+        before += block.chunks
+        colours.append(colour)
+    every = np.concatenate(colours)
+    order = np.argsort(every, kind="stable")
+    return Coloured(order[:, None] + np.arange(2), np.searchsorted(every[order], np.arange(every.max(initial=-1) + 2)))
+
+
 def whole(begin: int, end: int) -> Coloured:
     """Returns the chunks from ``begin`` to ``end`` as one task."""
     return Coloured(np.array([[begin, end]]), np.array([0, 1]))

@@ -22,7 +22,7 @@ from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.tags import Tag
 from ..parallel.team import Stage, Team
 from . import chunks, records, tasks
-from .colours import Coloured, coloured, whole
+from .chunk_tasks import ChunkTasks
 from .passes import BlockPass, Values
 from .records import Means, Scratches
 
@@ -65,9 +65,7 @@ class Elements:
         self._reals = self.peaks.view(np.float64).data
         self._standard = BlockPass(tasks.standard, tasks.STANDARD)
         self._again = BlockPass(tasks.again, tasks.AGAIN, marked=False)
-        self._coloured: dict[tuple[int, int], tuple[int, Coloured]] = {}
-        """Tasks of ranges of chunks; the key is the part and the first chunk. Each entry also has the value of
-        ``Block.moved`` (count of moved tets) for which its tasks are valid."""
+        self._tasks = ChunkTasks(team)
         self._comm, self._neighbours = comm, neighbours
         self._flags: FlagExchange | None = None
         self._connect()
@@ -215,14 +213,17 @@ class Elements:
         self._over_blocks(work, means, numbers, border=False)
 
     def _over_blocks(self, work: BlockPass, means: Values, numbers: Values, *, border: bool) -> None:
-        blocks, nodes = [block for block in self.model.blocks if not block.rigid], self.model.nodes
+        blocks, nodes = [block for block in self.model.blocks if not block.rigid and block.chunks], self.model.nodes
+        if self.team.threads > 1 and len(blocks) > 1 and not self._neighbours:
+            self._over_joined(work, blocks, means, numbers)
+            return
         clock = cpu_time if self._neighbours else wall_time  # the wall clock needs no system call
         now = clock() if len(blocks) > 1 else 0.0
         for block in blocks:
             first = block.border_chunks if self._neighbours else 0
             begin, end = (0, first) if border else (first, block.chunks)
             if begin < end:
-                some = self._tasks(block, begin, end)
+                some = self._tasks.of(block, begin, end, nodes.n)
                 table = work.address(nodes, block, self.scratches, means, numbers)
                 self.team.run(work.kernel, table, some.tasks, some.starts)
             if len(blocks) > 1:
@@ -231,23 +232,25 @@ class Elements:
         if self.team.threads > 1:
             chunks.gather_peaks(self.scratches.peaks)
 
+    def _over_joined(self, work: BlockPass, blocks: list[Block], means: Values, numbers: Values) -> None:
+        """Passes over several blocks in one parallel region."""
+        began, nodes = wall_time(), self.model.nodes
+        tables = [work.address(nodes, block, self.scratches, means, numbers) for block in blocks]
+        shares = self._tasks.run_joined(work.kernel, tables, blocks, nodes.n)
+        passed = wall_time() - began
+        for block, share in zip(blocks, shares.tolist(), strict=True):
+            block.seconds += passed * share
+        chunks.gather_peaks(self.scratches.peaks)
+
     def _staged(self, work: BlockPass, means: Values, numbers: Values) -> list[tuple[Stage, Block | None]]:
         """Returns a pass over all tets of a single rank as stages of a program."""
         found: list[tuple[Stage, Block | None]] = []
         for block in self.model.blocks:
             if not block.rigid and block.chunks:
-                some = self._tasks(block, 0, block.chunks)
+                some = self._tasks.of(block, 0, block.chunks, self.model.nodes.n)
                 table, ties = work.bind(self.model.nodes, block, self.scratches, means, numbers)
                 found.append((Stage(work.kernel, table, some.tasks, some.starts, ties), block))
         return found
-
-    def _tasks(self, block: Block, begin: int, end: int) -> Coloured:
-        moved, known = self._coloured.get((block.part, begin), (-1, None))
-        if known is None or moved != block.moved:
-            alone = self.team.threads == 1
-            known = whole(begin, end) if alone else coloured(block, begin, end, self.model.nodes.n)
-            self._coloured[block.part, begin] = block.moved, known
-        return known
 
     def _means(self) -> Values:
         return Means.none()
