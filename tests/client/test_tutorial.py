@@ -73,7 +73,7 @@ def test_the_tutorial_ends_with_the_documented_results(tmp_path: Path) -> None:
     force, at = max(zip(forces, times, strict=True))
     for text in (
         f"ends after {end.steps} steps with `{end.state}`, a worst residual of {rough(end.worst_residual)}",
-        f"{end.fragments} fragments", f"sphere still has {speeds[-1]:.0f} m/s",
+        f"{end.fragments} fragments", f"sphere still has a speed of {speeds[-1]:.0f} m/s",
         f"was {1e-3 * force:.0f} kN in the quarter model, after {1e6 * at:.1f} us",
     ):  # fmt: skip
         assert text in " ".join(TEXT.split())
