@@ -60,9 +60,7 @@ def coloured(block: Block, begin: int, end: int, nodes: int) -> Coloured:
     """
     colour = np.zeros(end - begin, np.int64)
     _give(block.tets[: block.n], begin, end, np.zeros(nodes, np.int64), colour)
-    order = np.argsort(colour, kind="stable")
-    tasks = begin + order[:, None] + np.arange(2)
-    return Coloured(tasks, np.searchsorted(colour[order], np.arange(colour.max(initial=-1) + 2)))
+    return _sorted(colour, begin)
 
 
 def joined(blocks: list[Block], nodes: int) -> Coloured:
@@ -76,9 +74,14 @@ def joined(blocks: list[Block], nodes: int) -> Coloured:
         colour[colour >= _BITS] += before
         before += block.chunks
         colours.append(colour)
-    every = np.concatenate(colours)
-    order = np.argsort(every, kind="stable")
-    return Coloured(order[:, None] + np.arange(2), np.searchsorted(every[order], np.arange(every.max(initial=-1) + 2)))
+    return _sorted(np.concatenate(colours), 0)
+
+
+def _sorted(colour: Ints, begin: int) -> Coloured:
+    """Returns the chunks from ``begin`` on as tasks, sorted by the ``colour`` (k,) of each chunk."""
+    order = np.argsort(colour, kind="stable")
+    tasks = begin + order[:, None] + np.arange(2)
+    return Coloured(tasks, np.searchsorted(colour[order], np.arange(colour.max(initial=-1) + 2)))
 
 
 def whole(begin: int, end: int) -> Coloured:

@@ -9,7 +9,7 @@ from ...model.columns import ABSENT, COPIED, ZERO, Columns
 from ...model.growing import Rooms
 from ...model.state import Bits, Flags, Floats, Indices, Ints
 from ..surface.normals import COLUMNS
-from ..surface.records import AGED, OPEN, SurfaceNodes
+from ..surface.records import AGED, OPEN, SurfaceNodes, names_of
 from .incidence import Incidence
 
 
@@ -200,7 +200,5 @@ class SceneEdges:
 
     @property
     def names(self) -> Ints:
-        """(e,) ids of the two faces of each edge, combined into one number. The number identifies the edge, because two
-        faces have at most one edge in common.
-        """
-        return (self.sides[:, 0] << 32) + self.sides[:, 1]
+        """(e,) name of each edge; see records.names_of."""
+        return names_of(self.sides)
